@@ -1,0 +1,37 @@
+"""Air hockey for robot learning and multi-agent reinforcement learning."""
+
+from pathlib import Path
+
+_here = Path(__file__).parent
+if not (_here / "scenarios").is_dir():
+    # In a checkout scenarios/ and agents/ lie beside this package; in a wheel, in it.
+    __path__.append(str(_here.parent))
+
+from marl_airhockey.make import (  # noqa: E402
+    env,
+    make_sb3_vec,
+    make_vec,
+    make_world,
+    parallel_env,
+)
+from marl_airhockey.registry import (  # noqa: E402
+    agent_names,
+    backend_names,
+    make_agent,
+    make_scenario,
+    scenario_names,
+)
+
+__version__ = "0.1.0"
+__all__ = [
+    "agent_names",
+    "backend_names",
+    "env",
+    "make_agent",
+    "make_sb3_vec",
+    "make_scenario",
+    "make_vec",
+    "make_world",
+    "parallel_env",
+    "scenario_names",
+]

@@ -1,0 +1,208 @@
+"""The PettingZoo ParallelEnv: one world, arrays turned into dicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Unpack
+
+import numpy as np
+from pettingzoo import ParallelEnv
+
+from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.render import Renderer
+from marl_airhockey.spaces import (
+    action_space,
+    global_state,
+    observation_space,
+    state_space,
+)
+from marl_airhockey.state import Array
+from marl_airhockey.world import Step
+
+Dicts = tuple[
+    dict[str, Any],
+    dict[str, float],
+    dict[str, bool],
+    dict[str, bool],
+    dict[str, dict[str, Any]],
+]
+
+
+class AirHockeyEnv(ParallelEnv[str, Any, Any]):
+    """One world of a scenario; the open seats are the agents, ``paddle_0`` and so on.
+
+    All agents stay to the end of the episode and end together. ``info`` of an agent
+    holds ``reward`` (terms by name), ``sent`` (what acted, as an action), ``success``
+    (latched), ``constraints`` and ``cost`` (by how much what was asked exceeded the
+    limits), ``touches`` and ``physics``.
+
+    Args:
+        scenario: name of the scenario.
+        render_mode: None, "rgb_array" or "human".
+        **keywords: see `make.build_world`.
+    """
+
+    metadata: dict[str, Any] = {
+        "name": "marl_airhockey",
+        "render_modes": ["human", "rgb_array"],
+        "is_parallelizable": True,
+        "render_fps": 20,
+    }
+
+    def __init__(
+        self,
+        scenario: str,
+        render_mode: str | None = None,
+        **keywords: Unpack[Keywords],
+    ) -> None:
+        self.world = build_world(scenario, 1, autoreset=False, keywords=keywords)
+        fps = round(1 / self.world.control_dt)
+        name = f"{scenario}_v{self.world.scenario.version}"
+        self.metadata = {**type(self).metadata, "name": name, "render_fps": fps}
+        self.render_mode = render_mode
+        self._renderer = Renderer.of(self.world, render_mode)
+        self.possible_agents = [f"paddle_{i}" for i in self.world.open]
+        self.agents: list[str] = []
+        observer = self.world.observer
+        self._observation_spaces = {
+            agent: observation_space(observer) for agent in self.possible_agents
+        }
+        self._action_spaces = {agent: action_space() for agent in self.possible_agents}
+        self.observation_spaces = self._observation_spaces
+        self.action_spaces = self._action_spaces
+        self.state_space = state_space(self.world)
+        self.np_random = np.random.default_rng()
+
+    @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return self.world.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self.world.max_cycles = cycles
+
+    @property
+    def teams(self) -> dict[int, list[str]]:
+        """Agents (driven ones too) by team."""
+        teams: dict[int, list[str]] = {}
+        for i, seat in enumerate(self.world.cast.seats):
+            teams.setdefault(seat.team, []).append(f"paddle_{i}")
+        return teams
+
+    def observation_space(self, agent: str) -> Any:
+        """The same object at every call."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        """The same object at every call."""
+        return self._action_spaces[agent]
+
+    def observation_labels(self, agent: str) -> tuple[str, ...]:
+        """Name of each element of the (flat part of the) observation."""
+        self._observation_spaces[agent]
+        return self.world.observer.layout.labels
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Begin an episode; the same seed gives the same episodes."""
+        if seed is not None:
+            self.np_random = np.random.default_rng(seed)
+        observation = self.world.reset(seed)
+        self.agents = self.possible_agents[:]
+        physics = {k: float(v[0]) for k, v in self.world.episode.physics.items()}
+        if self._renderer is not None:
+            self._renderer.begin()
+            self._show()
+        return self._dict(observation), {a: {"physics": physics} for a in self.agents}
+
+    def step(self, actions: Mapping[str, Any]) -> Dicts:
+        """Move by one control step.
+
+        Raises:
+            RuntimeError: before a reset, or after the end of the episode.
+            ValueError: a missing or extra agent, or a bad action, named.
+        """
+        if not self.agents:
+            if not actions and self.world.episode.number[0]:
+                return {}, {}, {}, {}, {}
+            raise RuntimeError("step: call reset() first; no episode is running")
+        result = self.world.step(self._array(actions))
+        agents = self.agents
+        terminated, truncated = bool(result.terminated[0]), bool(result.truncated[0])
+        rewards = result.reward[0].tolist()
+        outcome = (
+            self._dict(result.observation),
+            dict(zip(agents, rewards, strict=True)),
+            dict.fromkeys(agents, terminated),
+            dict.fromkeys(agents, truncated),
+            {agent: self._info(result, i) for i, agent in enumerate(agents)},
+        )
+        if terminated or truncated:
+            self.agents = []
+        if self._renderer is not None:
+            self._show()
+        return outcome
+
+    def _array(self, actions: Mapping[str, Any]) -> Array:
+        """(1, open, 2) from a dict with an action for each agent and no other."""
+        agents = self.agents
+        if len(actions) != len(agents) or any(a not in actions for a in agents):
+            missing = sorted(set(agents) - set(actions))
+            extra = sorted(set(actions) - set(agents))
+            raise ValueError(f"actions: missing agents {missing}, extra {extra}")
+        array = np.empty((1, len(agents), 2))
+        for i, agent in enumerate(agents):
+            action = np.asarray(actions[agent])
+            if action.shape != (2,) or action.dtype.kind not in "fiu":
+                raise ValueError(
+                    f"actions[{agent!r}]: expected 2 numbers, got shape {action.shape} "
+                    f"of dtype {action.dtype}"
+                )
+            array[0, i] = action
+        return array
+
+    def _dict(self, observation: Any) -> dict[str, Any]:
+        if isinstance(observation, Mapping):
+            return {
+                agent: {k: v[0, i] for k, v in observation.items()}
+                for i, agent in enumerate(self.possible_agents)
+            }
+        return dict(zip(self.possible_agents, observation[0], strict=True))
+
+    def _info(self, result: Step, i: int) -> dict[str, Any]:
+        seat = self.world.open[i]
+        excess = result.excess
+        return {
+            "reward": {k: float(v[0, i]) for k, v in result.terms.items()},
+            "sent": result.sent[0, i],
+            "success": bool(result.success[0, i]),
+            "constraints": {
+                "speed": float(excess.speed[0, seat]),
+                "acceleration": float(excess.acceleration[0, seat]),
+                "jerk": float(excess.jerk[0, seat]),
+                "reach": float(excess.reach[0, seat]),
+            },
+            "cost": float(result.cost[0, i]),
+        }
+
+    def state(self) -> Array:
+        """The true state of everything, table frame, for centralised critics."""
+        return np.asarray(global_state(self.world)[0])
+
+    def render(self) -> Array | None:
+        """A picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""
+        if self._renderer is None:
+            raise RuntimeError('render: build it with render_mode="rgb_array"')
+        return self._show()
+
+    def _show(self) -> Array | None:
+        assert self._renderer is not None
+        return self._renderer.show()
+
+    def close(self) -> None:
+        """Close the window and the physics."""
+        if self._renderer is not None:
+            self._renderer.close()
+        self.world.close()

@@ -1,0 +1,101 @@
+"""What seats are shown: layouts of pieces, dicts of goals, or pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from marl_airhockey.physics import Physics, unknown
+from marl_airhockey.scenario import GoalScenario, Scenario
+from marl_airhockey.sensor import Sensor
+from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.views import FRAMES, OBSERVE, Ego, Layout, Scope
+
+Observation = Array | Mapping[str, Array]
+"""(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
+PIXELS = 84
+
+
+class Observer:
+    """Shows sensed states to seats, in the form that each of them wants.
+
+    Args:
+        scenario: lists the pieces.
+        sensor: keeps the history.
+        physics: tells the top speed.
+        observe: the form for open seats, see `views.OBSERVE`.
+    """
+
+    def __init__(
+        self, scenario: Scenario, sensor: Sensor, physics: Physics, observe: str
+    ) -> None:
+        self.scenario, self.sensor, self.observe = scenario, sensor, observe
+        self._top_speed = physics.highest("paddle_speed")
+        self._layouts: dict[str, Layout] = {}
+        self.prepare(observe)
+
+    def prepare(self, observe: str) -> Layout:
+        """The layout of a form; pictures have that of velocities beside them."""
+        if observe not in OBSERVE:
+            raise ValueError(unknown("observe", observe, OBSERVE))
+        self.sensor.keeps_history |= observe != "velocity"
+        if observe not in self._layouts:
+            form = "velocity" if observe == "pixels" else observe
+            scope = Scope(self.scenario.cast, form, self._top_speed)
+            apart = self.scenario.goals == "dict"
+            pieces = tuple(
+                p for p in self.scenario.observation if not (apart and p.goal)
+            )
+            self._layouts[observe] = Layout(pieces, scope)
+        return self._layouts[observe]
+
+    @property
+    def layout(self) -> Layout:
+        """The layout of the open seats' observations."""
+        return self._layouts[self.observe]
+
+    def read(
+        self, sensed: State, memory: Memory, seats: Array, observe: str | None = None
+    ) -> Observation:
+        """Observations of some seats, in their order.
+
+        Args:
+            sensed: the sensed state of B worlds, table frame.
+            memory: the scenario's.
+            seats: (n,) indices of seats.
+            observe: the form; None for the open seats'.
+        """
+        observe = observe or self.observe
+        if observe == "pixels":
+            return self._pictures(memory, seats)
+        layout = self.prepare(observe)
+        ego = Ego(sensed, memory, self.sensor.history, layout.scope)
+        flat = layout.read(ego)
+        if len(seats) != flat.shape[1]:
+            flat = flat[:, seats]
+        scenario = self.scenario
+        if scenario.goals == "flat" or not isinstance(scenario, GoalScenario):
+            return flat
+        goals = {
+            "achieved_goal": scenario.achieved(sensed, memory),
+            "desired_goal": scenario.desired(memory),
+        }
+        shown = {k: v[:, None].astype(np.float32) for k, v in goals.items()}
+        return {"observation": flat, **shown}
+
+    def _pictures(self, memory: Memory, seats: Array) -> Array:
+        from marl_airhockey.render import small_picture
+
+        cast, frames = self.scenario.cast, self.sensor.frames
+        shape = (len(frames), len(seats), PIXELS, PIXELS, FRAMES)
+        out = np.empty(shape, np.uint8)
+        for b, world in enumerate(frames):
+            goal = memory["goal"][b] if "goal" in memory else None
+            for row, seat in enumerate(seats):
+                turn = cast.table.rotation(cast.seats[seat].side)
+                for k in range(FRAMES):
+                    out[b, row, :, :, k] = small_picture(
+                        cast, world[k], goal, turn, int(seat), PIXELS
+                    )
+        return out

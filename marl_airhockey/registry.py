@@ -1,0 +1,97 @@
+"""Find a scenario, an agent or a backend by the name of its file."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Callable, Mapping
+from types import ModuleType
+from typing import Any, cast
+
+from marl_airhockey.backend import Backend
+from marl_airhockey.driver import Driver
+from marl_airhockey.physics import unknown
+from marl_airhockey.scenario import Scenario
+
+
+def _names(folder: str) -> list[str]:
+    package = importlib.import_module(f"marl_airhockey.{folder}")
+    return sorted(m.name for m in pkgutil.iter_modules(package.__path__))
+
+
+def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
+    if name not in names:
+        raise ValueError(unknown(kind, name, names))
+    return importlib.import_module(f"marl_airhockey.{folder}.{name}")
+
+
+def scenario_names() -> list[str]:
+    """Names of all scenarios: the files of ``scenarios/``."""
+    return _names("scenarios")
+
+
+def scenario_version(name: str) -> int:
+    """Version of a scenario: the v of its gymnasium id."""
+    module = _load("scenario", "scenarios", name, scenario_names())
+    return cast(type[Scenario], module.make).version
+
+
+def agent_names() -> list[str]:
+    """Names of all drivers: the files of ``agents/``."""
+    return _names("agents")
+
+
+def backend_names() -> list[str]:
+    """Names of all backends: the files of ``backends/``."""
+    return _names("backends")
+
+
+def make_scenario(name: str, **options: Any) -> Scenario:
+    """Build what ``scenarios/<name>.py`` makes.
+
+    Raises:
+        ValueError: an unknown name or option, or an option that makes no sense.
+    """
+    module = _load("scenario", "scenarios", name, scenario_names())
+    known = [f.name for f in dataclasses.fields(module.make)]
+    return cast(Scenario, _build(f"option of {name}", module.make, options, known))
+
+
+def make_agent(name: str, **options: Any) -> Driver:
+    """Build what ``agents/<name>.py`` makes.
+
+    Raises:
+        ValueError: an unknown name or option.
+    """
+    module = _load("driver", "agents", name, agent_names())
+    known = list(inspect.signature(module.make).parameters)
+    return cast(Driver, _build(f"option of {name}", module.make, options, known))
+
+
+def find_backend(name: str) -> type[Backend]:
+    """The backend class of ``backends/<name>.py``.
+
+    Raises:
+        ValueError: an unknown name.
+        RuntimeError: it cannot run here; the message says the fix.
+    """
+    module = _load("backend", "backends", name, backend_names())
+    backend = cast(type[Backend], module.make)
+    reason = backend.available()
+    if reason:
+        raise RuntimeError(f"backend {name!r}: {reason}")
+    return backend
+
+
+def _build(
+    what: str,
+    make: Callable[..., object],
+    options: Mapping[str, Any],
+    known: list[str],
+) -> object:
+    for option in options:
+        if option not in known:
+            raise ValueError(unknown(what, option, known))
+    return make(**options)

@@ -1,0 +1,3 @@
+class Renderer:
+    @staticmethod
+    def of(world, mode): return None

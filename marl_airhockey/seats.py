@@ -1,0 +1,103 @@
+"""Seats that are driven inside the environment, each by a driver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from marl_airhockey.draws import Draws
+from marl_airhockey.driver import Driver, View
+from marl_airhockey.observer import Observer
+from marl_airhockey.state import Array, Memory, State
+
+
+class Driven:
+    """One driven seat of B worlds: its driver, the driver's memory and pace.
+
+    Raises:
+        ValueError: a driver whose control_dt is no multiple of the environment's.
+    """
+
+    def __init__(
+        self,
+        index: int,
+        driver: Driver,
+        observer: Observer,
+        num_worlds: int,
+        control_dt: float,
+    ) -> None:
+        self.index, self.driver, self._observer = index, driver, observer
+        cast = observer.scenario.cast
+        self._seat = cast.seats[index]
+        self._turn = cast.table.rotation(self._seat.side)
+        own = driver.control_dt or control_dt
+        self.every = round(own / control_dt)
+        if self.every < 1 or abs(self.every * control_dt - own) > 1e-9:
+            raise ValueError(
+                f"driver of paddle_{index}: its control_dt {own} s is not a multiple "
+                f"of the environment's {control_dt} s"
+            )
+        self._layout = observer.prepare(driver.observe or observer.observe)
+        never = np.zeros(num_worlds, np.int64)
+        self._draws = Draws.keyed(never, never, f"driver {index}")
+        self._held = np.zeros((num_worlds, 2))
+        self._memory: dict[str, Array] = {}
+        driver.__enter__()
+
+    def start(self, mask: Array, seeds: Array, episodes: Array) -> None:
+        """Begin an episode in the worlds of a mask."""
+        self._draws.renew(mask, seeds, episodes, f"driver {self.index}")
+        self._held[mask] = 0.0
+        rows = self.driver.start(
+            self._seat, self._draws.select(mask), int(mask.sum())
+        )
+        for name, row in rows.items():
+            if name not in self._memory:
+                self._memory[name] = np.zeros((len(mask), *row.shape[1:]), row.dtype)
+            self._memory[name][mask] = row
+
+    def measured(self) -> Array | None:
+        """(B, 4) where the paddle is, if the driver tells it."""
+        return self.driver.measured()
+
+    def act(
+        self, sensed: State, memory: Memory, physics: dict[str, Array], cycles: Array
+    ) -> Array:
+        """The asked velocity, (B, 2) fractions in the ego frame."""
+        due = cycles % self.every == 0
+        if not due.any():
+            return self._held
+        view = self.view(sensed, memory, physics)
+        asked, self._memory = self.driver.act(view, self._memory)
+        if asked.shape != self._held.shape or not np.isfinite(asked).all():
+            raise ValueError(
+                f"driver of paddle_{self.index}: act() must give finite numbers of "
+                f"shape {self._held.shape}, got {asked.shape}"
+            )
+        self._held = np.where(due[:, None], asked, self._held)
+        return self._held
+
+    def view(self, sensed: State, memory: Memory, physics: dict[str, Array]) -> View:
+        """What the driver sees."""
+        seats = np.array([self.index])
+        shown = self._observer.read(sensed, memory, seats, self.driver.observe)
+        ego = sensed
+        if self._turn[0, 0] != 1.0:
+            turned = (x @ self._turn.T for x in (sensed.position, sensed.velocity))
+            position, velocity = turned
+            ego = replace(sensed, position=position, velocity=velocity)
+        return View(
+            state=ego,
+            observation=(
+                {k: v[:, 0] for k, v in shown.items()}
+                if isinstance(shown, dict)
+                else np.asarray(shown)[:, 0]
+            ),
+            labels=self._layout.labels,
+            top_speed=physics["paddle_speed"],
+            reach=np.asarray(self._seat.reach),
+            draws=self._draws,
+            seat=self.index,
+            recall=memory,
+        )

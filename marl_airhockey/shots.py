@@ -1,0 +1,83 @@
+"""Goals that can be met: moments of legal shots at a falling puck."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marl_airhockey.cast import Cast
+from marl_airhockey.draws import Draws
+from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.starts import falling_puck, roll
+from marl_airhockey.state import Array
+from marl_airhockey.table import GRAVITY
+
+SECONDS = np.arange(0.0, 2.5, 0.005)
+TRIES = 20
+"""Shots tried at a puck before another puck is drawn."""
+
+
+def legal_shots(draws: Draws, cast: Cast) -> tuple[Array, Array]:
+    """Draw falling pucks and for each a moment of a shot that a robot seat can play.
+
+    The puck falls to x in -0.65 .. -0.30, is struck with a contact normal within 0.5 rad
+    of straight up and a normal paddle speed of 0 .. 0.6 m/s, the paddle's centre lying
+    in x -0.74 .. -0.38 and |y| <= 0.24, and rolls on with banks. The moment is a random
+    one of that path with x 0.05 .. 0.738, |y| < 0.205, within 30 deg of straight up and
+    vx at least 0.5 m/s.
+
+    Returns:
+        (W, 4) x, y, vx, vy of the puck at its start, and (W, 4) of the moment.
+
+    Raises:
+        RuntimeError: no shot was found in 100 pucks.
+    """
+    pucks, goals = np.zeros((len(draws), 4)), np.zeros((len(draws), 4))
+    open_rows = np.arange(len(draws))
+    for attempt in range(100 * TRIES):
+        some = draws.select(open_rows)
+        if attempt % TRIES == 0:
+            pucks[open_rows] = np.concatenate(falling_puck(some), -1)
+        goal, found = _shoot(some, pucks[open_rows], cast)
+        goals[open_rows[found]] = goal[found]
+        open_rows = open_rows[~found]
+        if not len(open_rows):
+            return pucks, goals
+    raise RuntimeError("start: no legal shot in 100 pucks")
+
+
+def _shoot(draws: Draws, puck: Array, cast: Cast) -> tuple[Array, Array]:
+    """One shot at each puck: a random goal moment (W, 4), and whether there is one."""
+    table, physics = cast.table, {k: p.default for k, p in PARAMETERS.items()}
+    physics.update(cast.defaults)
+    ways = (
+        GRAVITY * np.sin(np.radians(physics["tilt"])),
+        physics["puck_damping"],
+        float(table.size[1]) / 2 - table.puck_radius,
+        physics["wall_restitution"],
+    )
+    height = draws.uniform(-0.65, -0.30)
+    angle = draws.uniform(-0.5, 0.5)
+    push = draws.uniform(0.0, 0.6)
+    choice = draws.uniform(0.0, 1.0)
+    rows = np.arange(len(draws))
+
+    fall = roll(puck[:, :2], puck[:, 2:], SECONDS, *ways)
+    met = fall[rows, (fall[..., 0] <= height[:, None]).argmax(-1)]
+    normal = np.stack([np.cos(angle), np.sin(angle)], -1)
+    paddle = met[:, :2] - normal * (table.paddle_radius + table.puck_radius)
+    legal = (met[:, 0] <= height) & (np.abs(paddle[:, 1]) <= 0.24)
+    legal &= (paddle[:, 0] >= -0.74) & (paddle[:, 0] <= -0.38)
+
+    closing = (met[:, 2:] * normal).sum(-1) - push
+    bounce = (1 + physics["paddle_restitution"]) * closing
+    path = roll(met[:, :2], met[:, 2:] - bounce[:, None] * normal, SECONDS, *ways)
+    x, y, vx, vy = np.moveaxis(path, -1, 0)
+    rising = np.logical_and.accumulate(
+        (vx > 0.2) & (x < table.size[0] / 2 - table.puck_radius), axis=-1
+    )
+    good = rising & (x > 0.05) & (x < 0.738) & (np.abs(y) < 0.205)
+    good &= (vx >= 0.5) & (np.abs(vy) < np.tan(np.radians(30.0)) * vx)
+    count = good.sum(-1)
+    wanted = np.floor(choice * count) + 1
+    moment = (np.cumsum(good, axis=-1) >= wanted[:, None]).argmax(-1)
+    return path[rows, moment], legal & (closing < 0) & (count > 0)

@@ -1,0 +1,141 @@
+"""Samplers of first states that scenarios share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from marl_airhockey.cast import Cast
+from marl_airhockey.draws import Draws
+from marl_airhockey.state import Array, State, still_state
+from marl_airhockey.table import half_planes
+
+PADDLE_X = (-0.70, -0.60)
+PADDLE_Y = (-0.10, 0.10)
+"""m: where a single paddle starts unless its scenario says otherwise."""
+
+
+def place(draws: Draws, x: tuple[float, float], y: tuple[float, float]) -> Array:
+    """(W, 2) points uniform in a box of the standard table, m."""
+    low, high = np.array([x[0], y[0]]), np.array([x[1], y[1]])
+    return draws.uniform(low, high, 2)
+
+
+def first_state(cast: Cast, worlds: int) -> State:
+    """Rows with everything at the origin, at rest; obstacles at their places."""
+    state = still_state(cast.bodies, worlds, len(cast.mouths))
+    first = cast.bodies.movers
+    for i, obstacle in enumerate(cast.obstacles):
+        state.position[:, first + i] = obstacle.start
+    return state
+
+
+def falling_puck(draws: Draws) -> tuple[Array, Array]:
+    """A puck on its way down from the far half: (W, 2) position and velocity."""
+    position = place(draws, (0.4, 0.8), (-0.2, 0.2))
+    velocity = place(draws, (-1.0, -0.2), (-0.3, 0.3))
+    return position, velocity
+
+
+def falling(draws: Draws, cast: Cast) -> State:
+    """One paddle at home and every puck falling from the far half, none on another."""
+    state = first_state(cast, len(draws))
+    state.position[:, 0] = place(draws, PADDLE_X, PADDLE_Y)
+    first = cast.bodies.puck.start
+    for k in range(first, cast.bodies.puck.stop):
+        others = state.position[:, first:k]
+
+        def apart(rows: Array, others: Array = others) -> Array:
+            gap = np.linalg.norm(rows[:, None, 0] - others, axis=-1)
+            return np.asarray((gap > 3 * cast.table.puck_radius).all(-1))
+
+        puck = redraw(draws, lambda some: np.stack(falling_puck(some), 1), apart)
+        state.position[:, k], state.velocity[:, k] = puck[:, 0], puck[:, 1]
+    return state
+
+
+def puck_gap(state: State) -> Array:
+    """(W,) distance of paddle 0 to puck 0, m."""
+    gap = state.puck[:, 0] - state.paddle[:, 0]
+    return np.asarray(np.hypot(gap[:, 0], gap[:, 1]))
+
+
+def roll(
+    position: Array,
+    velocity: Array,
+    times: Array,
+    pull: float,
+    damping: float,
+    half_width: float,
+    restitution: float,
+) -> Array:
+    """Closed form of a puck that slides, falls and banks off the long walls.
+
+    With drag c the lateral way after time t is that of a free puck after
+    u = (1 - exp(-c t)) / c, so that banks come at known u.
+
+    Args:
+        position: (W, 2) m.
+        velocity: (W, 2) m/s.
+        times: (T,) s.
+        pull: acceleration toward home, m/s2.
+        damping: drag c, 1/s, above 0.
+        half_width: largest |y| of the puck's centre, m.
+        restitution: of the walls.
+
+    Returns:
+        (W, T, 4) x, y, vx, vy.
+    """
+    fade = np.exp(-damping * times)
+    u = (1 - fade) / damping
+    fall = pull / damping
+    vx = (velocity[:, :1] + fall) * fade - fall
+    x = position[:, :1] + (velocity[:, :1] + fall) * u - fall * times
+    side = np.where(velocity[:, 1:] < 0, -1.0, 1.0)
+    speed = np.maximum(np.abs(velocity[:, 1:]), 1e-9)
+    y, vy = position[:, 1:] + velocity[:, 1:] * u, velocity[:, 1:] * fade
+    bank = (half_width - side * position[:, 1:]) / speed
+    for _ in range(8):
+        past = u >= bank
+        if not past.any():
+            break
+        speed = speed * restitution
+        y = np.where(past, side * (half_width - speed * (u - bank)), y)
+        vy = np.where(past, -side * speed * fade, vy)
+        bank = bank + 2 * half_width / speed
+        side = -side
+    return np.stack([x, y, vx, vy], -1)
+
+
+def inside(draws: Draws, cast: Cast, seat: int, margin: float = 0.0) -> Array:
+    """(W, 2) points in a seat's reach, ``margin`` m from its edges, table frame."""
+    polygon = np.asarray(cast.seats[seat].reach)
+    normals, offsets = half_planes(cast.seats[seat].reach)
+    low, high = polygon.min(0) + margin, polygon.max(0) - margin
+
+    def sample(some: Draws) -> Array:
+        return some.uniform(low, high, 2)
+
+    def fits(points: Array) -> Array:
+        return np.asarray((points @ normals.T + offsets >= margin).all(-1))
+
+    ego = redraw(draws, sample, fits)
+    return np.asarray(ego @ cast.table.rotation(cast.seats[seat].side))
+
+
+def redraw(
+    draws: Draws, sample: Callable[[Draws], Array], accept: Callable[[Array], Array]
+) -> Array:
+    """Rows of ``sample``, each drawn again until ``accept`` takes it.
+
+    Raises:
+        RuntimeError: a row that is still refused after 1000 tries.
+    """
+    rows = sample(draws)
+    for _ in range(1000):
+        again = np.flatnonzero(~accept(rows))
+        if not len(again):
+            return rows
+        rows[again] = sample(draws.select(again))
+    raise RuntimeError("start: no acceptable first state in 1000 tries")
