@@ -9,7 +9,6 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from marl_airhockey.make import Keywords, build_world
-from marl_airhockey.render import Renderer
 from marl_airhockey.spaces import (
     action_space,
     global_state,
@@ -60,7 +59,12 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):
         name = f"{scenario}_v{self.world.scenario.version}"
         self.metadata = {**type(self).metadata, "name": name, "render_fps": fps}
         self.render_mode = render_mode
-        self._renderer = Renderer.of(self.world, render_mode)
+        self._renderer = None
+        if render_mode is not None:
+            from marl_airhockey.render import Renderer
+
+            title = scenario.replace("_", " ")
+            self._renderer = Renderer(self.world, render_mode, title)
         self.possible_agents = [f"paddle_{i}" for i in self.world.open]
         self.agents: list[str] = []
         observer = self.world.observer
@@ -114,7 +118,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):
         physics = {k: float(v[0]) for k, v in self.world.episode.physics.items()}
         if self._renderer is not None:
             self._renderer.begin()
-            self._show()
+        self._watch()
         return self._dict(observation), {a: {"physics": physics} for a in self.agents}
 
     def step(self, actions: Mapping[str, Any]) -> Dicts:
@@ -141,9 +145,13 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):
         )
         if terminated or truncated:
             self.agents = []
-        if self._renderer is not None:
-            self._show()
+        self._watch()
         return outcome
+
+    def _watch(self) -> None:
+        """Keep the trails, and in human mode the window, up to date."""
+        if self._renderer is not None:
+            self._renderer.follow()
 
     def _array(self, actions: Mapping[str, Any]) -> Array:
         """(1, open, 2) from a dict with an action for each agent and no other."""
@@ -195,10 +203,6 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):
         """A picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""
         if self._renderer is None:
             raise RuntimeError('render: build it with render_mode="rgb_array"')
-        return self._show()
-
-    def _show(self) -> Array | None:
-        assert self._renderer is not None
         return self._renderer.show()
 
     def close(self) -> None:

@@ -1,3 +1,409 @@
+"""Pictures of the 2D table: anti-aliased, from above, home on the left.
+
+One function draws a scene; the environment's `render`, the pictures in the docs and
+the videos all come from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from marl_airhockey.cast import Cast
+from marl_airhockey.physics import unknown
+from marl_airhockey.scenario import Mark
+from marl_airhockey.state import Array, State
+from marl_airhockey.table import Table
+
+Colour = tuple[int, int, int]
+SEAT_COLOURS: tuple[Colour, ...] = (
+    (0, 114, 178),
+    (213, 94, 0),
+    (0, 158, 115),
+    (204, 121, 167),
+    (86, 180, 233),
+    (230, 159, 0),
+)
+"""RGB; Okabe and Ito's palette, which colour-blind people can tell apart."""
+ROOM, RAIL, FIELD = (236, 239, 243), (52, 62, 76), (250, 251, 253)
+PRINT, FAINT, INK = (168, 196, 224), (214, 226, 238), (34, 40, 49)
+PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (46, 52, 64), (20, 24, 31), (222, 184, 112), (150, 112, 50)
+GOAL = (200, 60, 90)
+SMOOTH = 2
+"""Drawn this many times larger, then averaged."""
+SHIFT = 6
+"""Fractional bits of OpenCV's coordinates."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that a picture shows of one world."""
+
+    cast: Cast
+    state: State
+    """Without leading axes."""
+    marks: Sequence[Mark] = ()
+    trails: Sequence[Sequence[tuple[float, float]]] = ()
+    """Recent places of each puck, oldest first, m."""
+    title: str = ""
+    note: str = ""
+    """Score, at the right of the title bar."""
+    clock: float = 0.0
+    """Share of the episode that is over."""
+    success: bool = False
+
+
+class Canvas:
+    """A picture in metres: the table's bounding box and a margin."""
+
+    def __init__(self, table: Table, width: int, margin: float, bar: int) -> None:
+        corners = np.asarray(table.vertices)
+        self.low, high = corners.min(0) - margin, corners.max(0) + margin
+        self.scale = SMOOTH * width / float(high[0] - self.low[0])
+        self.bar = SMOOTH * bar
+        tall = round(float(high[1] - self.low[1]) * self.scale) + self.bar
+        # Even sizes: video codecs want them.
+        tall += -tall % (2 * SMOOTH)
+        self.image = np.full((tall, SMOOTH * width, 3), ROOM, np.uint8)
+        self.bottom = tall
+
+    def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
+        """Fixed-point pixel of a point in metres."""
+        x = (float(point[0]) - self.low[0]) * self.scale
+        y = self.bottom - (float(point[1]) - self.low[1]) * self.scale
+        return round(x * 2**SHIFT), round(y * 2**SHIFT)
+
+    def disc(
+        self, centre: Sequence[float] | Array, radius: float, colour: Colour
+    ) -> None:
+        """A filled disc, m."""
+        size = max(round(radius * self.scale * 2**SHIFT), 1)
+        cv2.circle(
+            self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT
+        )
+
+    def ring(
+        self,
+        centre: Sequence[float] | Array,
+        radius: float,
+        colour: Colour,
+        width: float = 1.5,
+    ) -> None:
+        """A circle; its line is ``width`` pixels wide."""
+        size = max(round(radius * self.scale * 2**SHIFT), 1)
+        line = max(round(width * SMOOTH), 1)
+        cv2.circle(
+            self.image, self.pixel(centre), size, colour, line, cv2.LINE_AA, SHIFT
+        )
+
+    def line(
+        self,
+        start: Sequence[float] | Array,
+        end: Sequence[float] | Array,
+        colour: Colour,
+        width: float = 1.5,
+    ) -> None:
+        """A straight line."""
+        wide = max(round(width * SMOOTH), 1)
+        a, b = self.pixel(start), self.pixel(end)
+        cv2.line(self.image, a, b, colour, wide, cv2.LINE_AA, SHIFT)
+
+    def polygon(self, corners: Array, colour: Colour, width: float = 0.0) -> None:
+        """A filled polygon, or its outline if ``width`` is given."""
+        points = np.array([self.pixel(c) for c in corners], np.int32)
+        if width:
+            wide = max(round(width * SMOOTH), 1)
+            cv2.polylines(
+                self.image, [points], True, colour, wide, cv2.LINE_AA, SHIFT
+            )
+        else:
+            cv2.fillPoly(self.image, [points], colour, cv2.LINE_AA, SHIFT)
+
+    def text(self, words: str, x: int, size: float, colour: Colour, right: bool) -> None:
+        """Words in the title bar, ``x`` pixels from its left or right end."""
+        font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
+        scale = size * SMOOTH
+        (wide, high), _ = cv2.getTextSize(words, font, scale, thick)
+        left = self.image.shape[1] - x * SMOOTH - wide if right else x * SMOOTH
+        place = (left, (self.bar + high) // 2)
+        cv2.putText(self.image, words, place, font, scale, colour, thick, cv2.LINE_AA)
+
+    def picture(self) -> Array:
+        """The finished picture (H, W, 3) uint8 RGB."""
+        size = (self.image.shape[1] // SMOOTH, self.image.shape[0] // SMOOTH)
+        return np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA))
+
+
+def draw(scene: Scene, width: int = 880) -> Array:
+    """A picture (H, W, 3) uint8 RGB of a scene, ``width`` pixels wide."""
+    canvas = Canvas(scene.cast.table, width, margin=0.075, bar=44)
+    _table(canvas, scene.cast)
+    for mark in scene.marks:
+        _mark(canvas, mark)
+    for trail in scene.trails:
+        _trail(canvas, trail, scene.cast.table.puck_radius)
+    _bodies(canvas, scene.cast, scene.state)
+    _bar(canvas, scene)
+    return canvas.picture()
+
+
+def _table(canvas: Canvas, cast: Cast) -> None:
+    table, corners = cast.table, np.asarray(cast.table.vertices)
+    grown = corners * (1 + 0.04 / table.offsets.min())
+    box = np.abs(corners) + 0.04
+    if len(corners) == 4:
+        grown = np.sign(corners) * box
+    canvas.polygon(grown, RAIL)
+    canvas.polygon(corners, FIELD)
+    half = table.size[1] / 2
+    canvas.ring((0, 0), 0.16, FAINT, 2)
+    if len(corners) == 4:
+        canvas.line((0, -half), (0, half), PRINT, 2)
+        for x in (-table.size[0] / 4, table.size[0] / 4):
+            canvas.line((x, -half), (x, half), FAINT, 1)
+    canvas.disc((0, 0), 0.012, PRINT)
+    for i, seat in enumerate(cast.seats):
+        reach = np.asarray(seat.reach) @ table.rotation(seat.side)
+        canvas.polygon(reach, _pale(_seat_colour(i), 0.86), 1)
+    for mouth in cast.mouths:
+        if mouth.width is None:
+            continue
+        start, end = table.ends(mouth.side)
+        along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
+        middle, out = (start + end) / 2, -0.04 * table.normals[mouth.side]
+        owner = next(
+            (i for i, s in enumerate(cast.seats) if s.side == mouth.side), 0
+        )
+        gap = np.array(
+            [middle - along, middle + along, middle + along + out, middle - along + out]
+        )
+        canvas.polygon(gap, _pale(_seat_colour(owner), 0.55))
+
+
+def _mark(canvas: Canvas, mark: Mark) -> None:
+    if mark.kind == "circle":
+        canvas.disc(mark.start, mark.radius, _pale(GOAL, 0.82))
+        canvas.ring(mark.start, mark.radius, GOAL, 2)
+        return
+    canvas.line(mark.start, mark.end, GOAL if mark.kind == "arrow" else PRINT, 2)
+    if mark.kind == "arrow":
+        tip, way = np.asarray(mark.end), np.subtract(mark.end, mark.start)
+        size = float(np.hypot(*way))
+        if size > 1e-6:
+            back, side = way / size * 0.03, np.array([-way[1], way[0]]) / size * 0.014
+            head = np.array([tip + back * 0.4, tip - back + side, tip - back - side])
+            canvas.polygon(head, GOAL)
+
+
+def _trail(
+    canvas: Canvas, trail: Sequence[tuple[float, float]], radius: float
+) -> None:
+    for i, (a, b) in enumerate(zip(trail[:-1], trail[1:], strict=True)):
+        age = (i + 1) / len(trail)
+        if np.hypot(b[0] - a[0], b[1] - a[1]) < 0.4:
+            wide = age * radius * canvas.scale / SMOOTH
+            canvas.line(a, b, _pale(PUCK, 1 - 0.3 * age), wide)
+
+
+def _bodies(canvas: Canvas, cast: Cast, state: State) -> None:
+    bodies, place = cast.bodies, state.position
+    radius, thin = bodies.radius, 1.5
+    for obstacle in cast.obstacles:
+        end = obstacle.end or obstacle.start
+        wide = 2 * obstacle.radius * canvas.scale / SMOOTH
+        canvas.line(obstacle.start, end, RAIL, wide)
+        canvas.disc(obstacle.start, obstacle.radius, RAIL)
+        canvas.disc(end, obstacle.radius, RAIL)
+    for k in range(bodies.block.start, bodies.block.stop):
+        if cast.block_shape == "disc":
+            canvas.disc(place[k], radius[k], BLOCK)
+            canvas.ring(place[k], radius[k], BLOCK_RIM, thin)
+        else:
+            c, s = np.cos(state.angle[k]), np.sin(state.angle[k])
+            square = radius[k] * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+            corners = place[k] + square @ np.array([[c, s], [-s, c]])
+            canvas.polygon(corners, BLOCK)
+            canvas.polygon(corners, BLOCK_RIM, thin)
+    for k in range(bodies.paddles):
+        colour = _seat_colour(k)
+        canvas.disc(place[k], radius[k], colour)
+        canvas.ring(place[k], radius[k] * 0.97, _dark(colour), thin)
+        canvas.disc(place[k], radius[k] * 0.52, _pale(colour, 0.25))
+        canvas.ring(place[k], radius[k] * 0.52, _dark(colour), 1)
+    for k in range(bodies.puck.start, bodies.puck.stop):
+        canvas.disc(place[k], radius[k], PUCK)
+        canvas.ring(place[k], radius[k] * 0.96, PUCK_RIM, 1)
+        canvas.ring(place[k], radius[k] * 0.55, _pale(PUCK, 0.35), thin)
+
+
+def _bar(canvas: Canvas, scene: Scene) -> None:
+    width = canvas.image.shape[1]
+    canvas.image[: canvas.bar] = FIELD
+    canvas.text(scene.title, 22, 0.55, INK, right=False)
+    note = scene.note + ("   success" if scene.success else "")
+    canvas.text(note, 22, 0.5, (0, 130, 95) if scene.success else INK, right=True)
+    done = round(width * min(max(scene.clock, 0.0), 1.0))
+    strip = slice(canvas.bar - 3 * SMOOTH, canvas.bar)
+    canvas.image[strip] = FAINT
+    canvas.image[strip, :done] = _seat_colour(0)
+
+
+def _seat_colour(seat: int) -> Colour:
+    return SEAT_COLOURS[seat % len(SEAT_COLOURS)]
+
+
+def _pale(colour: Colour, share: float) -> Colour:
+    r, g, b = (round(c + (255 - c) * share) for c in colour)
+    return r, g, b
+
+
+def _dark(colour: Colour) -> Colour:
+    r, g, b = (round(c * 0.62) for c in colour)
+    return r, g, b
+
+
+def small_picture(
+    cast: Cast, position: Array, goal: Array | None, turn: Array, seat: int, size: int
+) -> Array:
+    """What a seat sees as pixels: (size, size) uint8 grey, ego frame.
+
+    Args:
+        cast: who is on the table.
+        position: (N, 2) sensed positions, table frame, m.
+        goal: (2,) wanted place, or None.
+        turn: (2, 2) from the table frame to the seat's ego frame.
+        seat: the seat's index; its own paddle is the brighter one.
+        size: pixels.
+    """
+    image = np.zeros((size, size), np.uint8)
+    corners = np.asarray(cast.table.vertices) @ turn.T
+    extent = float(np.abs(corners).max())
+    scale = (size / 2 - 1) / extent
+
+    def pixel(point: Array) -> tuple[int, int]:
+        x, y = turn @ point * scale
+        return round((size / 2 + x) * 2**SHIFT), round((size / 2 - y) * 2**SHIFT)
+
+    outline = np.array([pixel(np.asarray(c)) for c in cast.table.vertices], np.int32)
+    cv2.fillPoly(image, [outline], 50, cv2.LINE_AA, SHIFT)
+    if goal is not None:
+        wide = round(0.05 * scale * 2**SHIFT)
+        cv2.circle(image, pixel(goal), wide, 110, 1, cv2.LINE_AA, SHIFT)
+    for k, (kind, radius) in enumerate(
+        zip(cast.bodies.kind, cast.bodies.radius, strict=True)
+    ):
+        grey = (140, 255, 90, 70)[kind] + (60 if k == seat else 0)
+        wide = round(radius * scale * 2**SHIFT)
+        cv2.circle(image, pixel(position[k]), wide, grey, -1, cv2.LINE_AA, SHIFT)
+    return image
+
+
+@dataclass
 class Renderer:
-    @staticmethod
-    def of(world, mode): return None
+    """Shows world 0 of an environment, with trails; in a window if ``mode`` is human."""
+
+    world: Any
+    """A `world.World`."""
+    mode: str
+    title: str
+    index: int = 0
+    _trails: list[list[tuple[float, float]]] = field(default_factory=list)
+    _window: Any = None
+
+    MODES = ("rgb_array", "human")
+    TRAIL = 24
+
+    def __post_init__(self) -> None:
+        if self.mode not in self.MODES:
+            raise ValueError(unknown("render_mode", self.mode, self.MODES))
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the trails: an episode begins."""
+        self._trails = [[] for _ in range(self.world.cast.pucks)]
+
+    def follow(self) -> None:
+        """After a reset or a step: lengthen the trails; in human mode show it."""
+        for trail, puck in zip(
+            self._trails, self.world.state.puck[self.index], strict=True
+        ):
+            trail.append((float(puck[0]), float(puck[1])))
+            del trail[: -self.TRAIL]
+        if self.mode == "human":
+            self.show()
+
+    def scene(self) -> Scene:
+        """What there is to see now."""
+        world, i = self.world, self.index
+        state = world.state.map(lambda x: x[i])
+        memory = {name: value[i] for name, value in world.memory.items()}
+        episode = world.episode
+        note = f"{float(state.time):4.1f} s   return {episode.returns[i, 0]:+.2f}"
+        if "touches" in memory:
+            note = f"touches {int(memory['touches'].sum())}   {note}"
+        return Scene(
+            cast=world.cast,
+            state=state,
+            marks=world.scenario.marks(state, memory),
+            trails=self._trails,
+            title=self.title,
+            note=note,
+            clock=episode.cycles[i] / world.max_cycles,
+            success=bool(episode.success[i].any()),
+        )
+
+    def show(self) -> Array | None:
+        """The picture; in human mode it goes to the window and None comes back."""
+        picture = draw(self.scene())
+        if self.mode == "rgb_array":
+            return picture
+        from marl_airhockey.window import Window
+
+        if self._window is None:
+            rate = 1 / self.world.control_dt
+            self._window = Window(picture.shape[1], picture.shape[0], rate)
+        self._window.show(picture)
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+
+def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path:
+    """Write pictures (H, W, 3) as a .gif or an .mp4.
+
+    Raises:
+        ValueError: no picture, or another ending.
+        OSError: the file could not be written.
+    """
+    path = Path(path)
+    if not pictures:
+        raise ValueError("video: no pictures to write")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    frames = [cv2.cvtColor(p, cv2.COLOR_RGB2BGR) for p in pictures]
+    if path.suffix == ".gif":
+        animation = cv2.Animation()
+        animation.frames = frames
+        animation.durations = np.full(len(frames), round(1000 / fps), np.int32)
+        good = cv2.imwriteanimation(str(path), animation)
+    elif path.suffix == ".mp4":
+        size = (frames[0].shape[1], frames[0].shape[0])
+        code = cv2.VideoWriter.fourcc(*"mp4v")
+        writer = cv2.VideoWriter(str(path), code, fps, size)
+        good = writer.isOpened()
+        for frame in frames:
+            writer.write(frame)
+        writer.release()
+    else:
+        raise ValueError(f"video: {path.name!r} must end in .gif or .mp4")
+    if not good:
+        raise OSError(f"video: {path} could not be written")
+    return path

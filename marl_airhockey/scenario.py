@@ -226,6 +226,6 @@ class GoalScenario(Scenario):
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
         """(...) 1 where the goal is met, else 0; of goals alone."""
 
-    def met(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def met(self, after: State, memory: Memory) -> Array:
         reward = self.goal_reward(self.achieved(after, memory), self.desired(memory))
         return np.asarray(reward > 0)

@@ -149,13 +149,13 @@ class Piece(ABC):
 class Own(Piece):
     """The seat's own paddle: position and velocity, as its robot reports them."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         centre = float(np.mean([x for x, _ in scope.cast.seats[0].reach]))
         return scope.place("own", (0.2, 0.2), centre) + scope.motion(
             "own", scope.top_speed, scope.top_speed
         )
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         return np.concatenate([ego.own, ego.own_velocity], -1)
 
 
@@ -163,14 +163,14 @@ class Own(Piece):
 class Others(Piece):
     """The other paddles, mates first, each group by ego angle of its seat's side."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         columns = []
         for i in range(len(scope.cast.seats) - 1):
             columns += scope.place(f"other_{i}", (0.5, 0.2))
             columns += scope.motion(f"other_{i}", scope.top_speed, scope.top_speed)
         return columns
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         order = _others(ego.scope.cast)
         rows = np.arange(len(order))[:, None]
         place = ego.turn(ego.state.paddle)[..., rows, order, :]
@@ -201,7 +201,7 @@ def _others(cast: Cast) -> Array:
 class Pucks(Piece):
     """Every puck: position and velocity, or its sensed history."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         columns: list[Column] = []
         for i in range(scope.cast.pucks):
             if scope.observe == "velocity":
@@ -213,7 +213,7 @@ class Pucks(Piece):
                     columns.append(Column(f"puck_{i}[-{ago}].seen", 0.0, 1.0, 1.0))
         return columns
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         if ego.scope.observe == "velocity":
             both = np.concatenate([ego.puck, ego.puck_velocity], -1)
             return both.reshape(*both.shape[:-2], -1)
@@ -229,11 +229,11 @@ class Pucks(Piece):
 class PucksFromOwn(Piece):
     """The way from the seat's own paddle to every puck."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         names = [f"own_to_puck_{i}" for i in range(scope.cast.pucks)]
         return [c for name in names for c in scope.gap(name, (0.25, 0.125))]
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         gap = ego.puck - ego.own[..., None, :]
         return gap.reshape(*gap.shape[:-2], -1)
 
@@ -245,11 +245,11 @@ class Blocks(Piece):
     x: float
     """Where blocks are to be expected, m."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         names = [f"block_{i}" for i in range(scope.cast.blocks)]
         return [c for name in names for c in scope.place(name, (0.3, 0.2), self.x)]
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         place = ego.turn(ego.state.block)
         return place.reshape(*place.shape[:-2], -1)
 
@@ -258,11 +258,11 @@ class Blocks(Piece):
 class BlocksFromPuck(Piece):
     """The way from puck 0 to every block."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         names = [f"puck_0_to_block_{i}" for i in range(scope.cast.blocks)]
         return [c for name in names for c in scope.gap(name, (1.0, 0.5))]
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         gap = ego.turn(ego.state.block) - ego.puck[..., :1, :]
         return gap.reshape(*gap.shape[:-2], -1)
 
@@ -271,10 +271,10 @@ class BlocksFromPuck(Piece):
 class Touched(Piece):
     """1 once any paddle has touched any puck."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         return [Column("touched", 0.0, 1.0, 1.0)]
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         flag = (ego.memory["touches"] > 0).any((-1, -2))[..., None]
         seats = len(ego.scope.cast.seats)
         return np.broadcast_to(flag, (*flag.shape[:-1], seats))[..., None]
@@ -293,12 +293,12 @@ class Goal(Piece):
     """"own" or "puck": what the goal is for."""
     goal = True
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         return scope.place("goal", self.unit, self.x) + scope.gap(
             f"{self.origin}_to_goal", self.unit
         )
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         goal = ego.turn(ego.memory["goal"][..., None, :])[..., 0, :]
         origin = ego.own if self.origin == "own" else ego.puck[..., 0, :]
         return np.concatenate([goal, goal - origin], -1)
@@ -312,10 +312,10 @@ class GoalVelocity(Piece):
     unit: float
     goal = True
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         return scope.motion("goal", self.most, self.unit)
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         return ego.turn(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
 
 
@@ -330,11 +330,11 @@ class Recall(Piece):
     from_own: bool = False
     """True to show a height as seen from the own paddle."""
 
-    def columns(self, scope: Scope) -> list[Column]:  # noqa: D102
+    def columns(self, scope: Scope) -> list[Column]:
         names = [f"{self.name}_{i}" for i in range(scope.cast.pucks)]
         return [Column(name, self.low, self.high, self.unit) for name in names]
 
-    def read(self, ego: Ego) -> Array:  # noqa: D102
+    def read(self, ego: Ego) -> Array:
         value = ego.memory[self.name][..., None, :]
         if self.from_own:
             return np.asarray(value - ego.own[..., :1])

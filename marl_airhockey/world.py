@@ -126,6 +126,12 @@ class World:
         self.memory: Memory = {}
         self._sensed = self.state
         self._pushed = np.zeros((b, n, 2))
+        self.asked, self.sent = np.zeros((2, b, n, 2))
+
+    asked: Array
+    """(B, seats, 2) what was asked in the last step, after its delay: ego fractions"""
+    sent: Array
+    """(B, seats, 2) what was sent in the last step, table frame, m/s"""
 
     def seed(self, seed: int) -> None:
         """Give world i the seed + i; takes effect at the next `reset`."""
@@ -214,6 +220,7 @@ class World:
         speed = values["paddle_speed"][:, None]
         acceleration = values["paddle_acceleration"][:, None]
         wanted = asked * speed[..., None]
+        self.asked = asked
         sent, excess = limits(
             (wanted[..., None, :] @ self._to_ego)[..., 0, :],
             before.paddle,
@@ -224,6 +231,7 @@ class World:
             acceleration,
             self.control_dt,
         )
+        self.sent = sent
         after = self.backend.step(Command(sent, told))
         self._pushed = (sent - before.paddle_velocity) / self.control_dt
         new = self.scenario.advance(old, before, sent, after)

@@ -27,12 +27,12 @@ class HitGoal(GoalScenario):
     """m, of the circle."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         home = Mouth("home", 0)
         seats = (self.seat(),)
         return Cast(self.table_geometry, seats, pucks=1, mouths=(home,), path=True)
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         return state, {
             **rewards.no_touches(worlds, 1, 1),
@@ -42,7 +42,7 @@ class HitGoal(GoalScenario):
             "entered": np.zeros(worlds, np.bool_),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         goal = memory["goal"]
@@ -61,7 +61,7 @@ class HitGoal(GoalScenario):
         views.Goal((0.3, 0.2), 0.31, "puck"),
     )
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -71,29 +71,29 @@ class HitGoal(GoalScenario):
             "drop": -1.0 * after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return memory["entered"] | after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return memory["entered"]
 
     @property
-    def goal_bounds(self) -> tuple[float, ...]:  # noqa: D102
+    def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, 1.0)
 
-    def achieved(self, state: State, memory: Memory) -> Array:  # noqa: D102
+    def achieved(self, state: State, memory: Memory) -> Array:
         rising = rewards.touched(memory) & (state.puck_velocity[..., 0, 0] > 0)
         return np.concatenate([state.puck[..., 0, :], 1.0 * rising[..., None]], -1)
 
-    def desired(self, memory: Memory) -> Array:  # noqa: D102
+    def desired(self, memory: Memory) -> Array:
         goal = memory["goal"]
         return np.concatenate([goal, np.ones((*goal.shape[:-1], 1))], -1)
 
-    def goal_reward(self, achieved: Array, desired: Array) -> Array:  # noqa: D102
+    def goal_reward(self, achieved: Array, desired: Array) -> Array:
         near = length(achieved[..., :2] - desired[..., :2]) < self.radius
         return 1.0 * (near & (achieved[..., 2] > 0.5))
 
-    def marks(self, state: State, memory: Memory) -> list[Mark]:  # noqa: D102
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
 
 

@@ -35,12 +35,12 @@ class HitGoalVelocity(GoalScenario):
     """m/s: this much more."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         home = Mouth("home", 0)
         seats = (self.seat(),)
         return Cast(self.table_geometry, seats, pucks=1, mouths=(home,), path=True)
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         puck, goal = legal_shots(draws, self.cast)
         state.position[:, 1], state.velocity[:, 1] = puck[:, :2], puck[:, 2:]
@@ -53,7 +53,7 @@ class HitGoalVelocity(GoalScenario):
             "entered": np.zeros(worlds, np.bool_),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         entered, gap, error = rewards.enters(
@@ -84,7 +84,7 @@ class HitGoalVelocity(GoalScenario):
         views.GoalVelocity(2.5, 0.6),
     )
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -94,26 +94,26 @@ class HitGoalVelocity(GoalScenario):
             "drop": -1.0 * after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return memory["entered"] | after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return memory["entered"]
 
     @property
-    def goal_bounds(self) -> tuple[float, ...]:  # noqa: D102
+    def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, 5.0, 5.0, 1.0)
 
-    def achieved(self, state: State, memory: Memory) -> Array:  # noqa: D102
+    def achieved(self, state: State, memory: Memory) -> Array:
         puck, velocity = state.puck[..., 0, :], state.puck_velocity[..., 0, :]
         rising = rewards.touched(memory) & (velocity[..., 0] > 0)
         return np.concatenate([puck, velocity, 1.0 * rising[..., None]], -1)
 
-    def desired(self, memory: Memory) -> Array:  # noqa: D102
+    def desired(self, memory: Memory) -> Array:
         goal, velocity = memory["goal"], memory["goal_velocity"]
         return np.concatenate([goal, velocity, np.ones((*goal.shape[:-1], 1))], -1)
 
-    def goal_reward(self, achieved: Array, desired: Array) -> Array:  # noqa: D102
+    def goal_reward(self, achieved: Array, desired: Array) -> Array:
         near = length(achieved[..., :2] - desired[..., :2]) < self.radius
         return 1.0 * (
             near
@@ -127,7 +127,7 @@ class HitGoalVelocity(GoalScenario):
             )
         )
 
-    def marks(self, state: State, memory: Memory) -> list[Mark]:  # noqa: D102
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
         goal, velocity = memory["goal"], memory["goal_velocity"]
         return [Mark.circle(goal, self.radius), Mark.arrow(goal, 0.2 * velocity)]
 

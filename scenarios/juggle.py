@@ -31,12 +31,12 @@ class Juggle(Scenario):
     """Hits that make a success."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         home = Mouth("home", 0)
         seats = (self.seat(),)
         return Cast(self.table_geometry, seats, pucks=self.pucks, mouths=(home,))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         return starts.falling(draws, self.cast), {
             **rewards.no_touches(worlds, 1, self.pucks),
             "armed": np.zeros((worlds, self.pucks)),
@@ -44,7 +44,7 @@ class Juggle(Scenario):
             "hits": np.zeros(worlds),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         height = rewards.contact_height(before, after)
@@ -66,7 +66,7 @@ class Juggle(Scenario):
         views.Recall("struck_at", -1.0, 1.0, 1.0, from_own=True),
     )
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -74,13 +74,13 @@ class Juggle(Scenario):
             "drop": -2.0 * self.terminated(after, new)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return after.crossed[..., 0].any(-1)
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return np.asarray(memory["hits"] >= self.hits)
 
-    def marks(self, state: State, memory: Memory) -> list[Mark]:  # noqa: D102
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
         wide = float(self.table_geometry.size[1]) / 2
         armed = memory["struck_at"][memory["armed"] > 0]
         return [Mark.line((x + self.lift, -wide), (x + self.lift, wide)) for x in armed]

@@ -30,7 +30,7 @@ class MoveBlock(Scenario):
     """Shape of the block."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         return Cast(
             self.table_geometry,
             (self.seat(),),
@@ -40,7 +40,7 @@ class MoveBlock(Scenario):
             mouths=(Mouth("home", 0),),
         )
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
 
         def sample(some: Draws) -> Array:
@@ -59,7 +59,7 @@ class MoveBlock(Scenario):
             "moved": np.zeros(worlds),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         touched, block = rewards.touched(memory), after.block[..., 0, :]
@@ -85,7 +85,7 @@ class MoveBlock(Scenario):
         views.BlocksFromPuck(),
     )
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -96,10 +96,10 @@ class MoveBlock(Scenario):
             "drop": -1.0 * after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return self.success(after, memory) | after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return np.asarray(memory["moved"] >= self.way)
 
 

@@ -23,11 +23,11 @@ class PuckVelocity(Scenario):
     """m/s: wanted upward speed."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         home = Mouth("home", 0)
         return Cast(self.table_geometry, (self.seat(),), pucks=1, mouths=(home,))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         return state, {
             **rewards.no_touches(worlds, 1, 1),
@@ -35,7 +35,7 @@ class PuckVelocity(Scenario):
             "rise": np.zeros(worlds),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         rise = after.puck_velocity[..., 0, 0] * rewards.touched(memory)
@@ -46,7 +46,7 @@ class PuckVelocity(Scenario):
 
     observation = (views.Own(), views.Pucks(), views.PucksFromOwn(), views.Touched())
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -56,10 +56,10 @@ class PuckVelocity(Scenario):
             "drop": -1.0 * after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return self.success(after, memory) | after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return np.asarray(memory["rise"] >= self.fast)
 
 

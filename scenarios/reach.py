@@ -29,10 +29,10 @@ class Reach(GoalScenario):
     """m: shortest distance of a goal from the paddle."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         return Cast(self.table_geometry, (self.seat(),))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         paddle = state.paddle[:, 0]
 
@@ -44,14 +44,14 @@ class Reach(GoalScenario):
         )
         return state, {"goal": goal, "was": paddle.copy(), "here": paddle.copy()}
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         return {"was": before.paddle[..., 0, :], "here": after.paddle[..., 0, :]}
 
     observation = (views.Own(), views.Goal((0.2, 0.2), -0.55, "own"))
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         gap = length(before.paddle - old["goal"][..., None, :])
@@ -62,28 +62,28 @@ class Reach(GoalScenario):
             "success": 2.0 * self.success(after, new)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return self.success(after, memory)
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return self.met(after, memory)
 
     @property
-    def goal_bounds(self) -> tuple[float, ...]:  # noqa: D102
+    def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, *self.table_geometry.size / 2)
 
-    def achieved(self, state: State, memory: Memory) -> Array:  # noqa: D102
+    def achieved(self, state: State, memory: Memory) -> Array:
         return np.concatenate([memory["here"], memory["was"]], -1)
 
-    def desired(self, memory: Memory) -> Array:  # noqa: D102
+    def desired(self, memory: Memory) -> Array:
         return np.concatenate([memory["goal"], memory["goal"]], -1)
 
-    def goal_reward(self, achieved: Array, desired: Array) -> Array:  # noqa: D102
+    def goal_reward(self, achieved: Array, desired: Array) -> Array:
         gap = achieved - desired
         near = length(gap[..., :2]) < self.radius
         return 1.0 * (near & (length(gap[..., 2:]) < self.radius))
 
-    def marks(self, state: State, memory: Memory) -> list[Mark]:  # noqa: D102
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
 
 

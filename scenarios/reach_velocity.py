@@ -35,10 +35,10 @@ class ReachVelocity(GoalScenario):
     """m: distance of a goal from every edge of the reach."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         return Cast(self.table_geometry, (self.seat(),))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         goal = starts.inside(draws, self.cast, 0, self.margin)
         angle = draws.uniform(-np.pi, np.pi)
@@ -52,7 +52,7 @@ class ReachVelocity(GoalScenario):
             "score": np.zeros(worlds),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         gap = length(after.paddle[..., 0, :] - memory["goal"])
@@ -69,7 +69,7 @@ class ReachVelocity(GoalScenario):
         views.GoalVelocity(1.0, 0.5),
     )
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -79,30 +79,30 @@ class ReachVelocity(GoalScenario):
             "success": 2.0 * self.success(after, new)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return self.success(after, memory)
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return self.met(after, memory)
 
     @property
-    def goal_bounds(self) -> tuple[float, ...]:  # noqa: D102
+    def goal_bounds(self) -> tuple[float, ...]:
         top = 1.5 * self.cast.seats[0].speed
         return (*self.table_geometry.size / 2, top, top)
 
-    def achieved(self, state: State, memory: Memory) -> Array:  # noqa: D102
+    def achieved(self, state: State, memory: Memory) -> Array:
         both = state.paddle[..., 0, :], state.paddle_velocity[..., 0, :]
         return np.concatenate(both, -1)
 
-    def desired(self, memory: Memory) -> Array:  # noqa: D102
+    def desired(self, memory: Memory) -> Array:
         return np.concatenate([memory["goal"], memory["goal_velocity"]], -1)
 
-    def goal_reward(self, achieved: Array, desired: Array) -> Array:  # noqa: D102
+    def goal_reward(self, achieved: Array, desired: Array) -> Array:
         gap = achieved - desired
         near = length(gap[..., :2]) < self.radius
         return 1.0 * (near & (length(gap[..., 2:]) < self.error))
 
-    def marks(self, state: State, memory: Memory) -> list[Mark]:  # noqa: D102
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
         goal, velocity = memory["goal"], memory["goal_velocity"]
         return [Mark.circle(goal, self.radius), Mark.arrow(goal, velocity)]
 

@@ -30,11 +30,11 @@ class Strike(Scenario):
     """m: wanted distance from where it lay."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         flat = {"tilt": 0.0}
         return Cast(self.table_geometry, (self.seat(),), pucks=1, physics=flat)
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.first_state(self.cast, worlds)
         state.position[:, 0] = starts.place(draws, (-0.74, -0.64), starts.PADDLE_Y)
         state.position[:, 1] = starts.place(draws, (-0.49, -0.32), (-0.20, 0.20))
@@ -46,7 +46,7 @@ class Strike(Scenario):
             "struck": np.zeros(worlds, np.bool_),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         speed = length(after.puck_velocity[..., 0, :])
@@ -59,7 +59,7 @@ class Strike(Scenario):
 
     observation = (views.Own(), views.Pucks(), views.PucksFromOwn(), views.Touched())
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -69,10 +69,10 @@ class Strike(Scenario):
             "success": 2.0 * (new["struck"] & ~old["struck"])[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return memory["struck"]
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return memory["struck"]
 
 

@@ -34,7 +34,7 @@ class StrikeCrowd(Scenario):
     """Shape of the blocks."""
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         return Cast(
             self.table_geometry,
             (self.seat(),),
@@ -45,7 +45,7 @@ class StrikeCrowd(Scenario):
             physics={"tilt": 0.0, "block_friction": 0.5},
         )
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.first_state(self.cast, worlds)
         state.position[:, 0] = starts.place(draws, (-0.74, -0.64), starts.PADDLE_Y)
         state.position[:, 1] = starts.place(draws, (-0.49, -0.32), (-0.10, 0.10))
@@ -69,7 +69,7 @@ class StrikeCrowd(Scenario):
             "rise": np.zeros(worlds),
         }
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         spread = length(after.block - memory["origin"]).sum(-1)
@@ -88,7 +88,7 @@ class StrikeCrowd(Scenario):
         views.Blocks(0.35),
     )
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -99,10 +99,10 @@ class StrikeCrowd(Scenario):
             "success": 3.0 * self.success(after, new)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return self.success(after, memory)
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return np.asarray(memory["spread"] >= self.spread)
 
 

@@ -22,23 +22,23 @@ class Touch(Scenario):
     seconds: float = 5.0
 
     @cached_property
-    def cast(self) -> Cast:  # noqa: D102
+    def cast(self) -> Cast:
         home = Mouth("home", 0)
         return Cast(self.table_geometry, (self.seat(),), pucks=1, mouths=(home,))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:  # noqa: D102
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         memory = rewards.no_touches(worlds, 1, 1)
         return state, {**memory, "gap": starts.puck_gap(state)}
 
-    def remember(  # noqa: D102
+    def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         return {"gap": rewards.nearest(memory, after)}
 
     observation = (views.Own(), views.Pucks(), views.PucksFromOwn(), views.Touched())
 
-    def reward_terms(  # noqa: D102
+    def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
@@ -47,10 +47,10 @@ class Touch(Scenario):
             "drop": -1.0 * self.terminated(after, new)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def terminated(self, after: State, memory: Memory) -> Array:
         return after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:  # noqa: D102
+    def success(self, after: State, memory: Memory) -> Array:
         return rewards.touched(memory)
 
 

@@ -342,20 +342,20 @@ class Pymunk(Backend):
         self._never = np.zeros((num_worlds, len(cast.seats)), np.bool_)
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
 
-    def set_physics(self, values: dict[str, Array], mask: Array) -> None:  # noqa: D102
+    def set_physics(self, values: dict[str, Array], mask: Array) -> None:
         for i in np.flatnonzero(mask):
             row = {name: float(value[i]) for name, value in values.items()}
             self.spaces[i].set_physics(row)
             self._kicks[i] = self.spaces[i].kick
 
-    def start(self, state: State, mask: Array) -> None:  # noqa: D102
+    def start(self, state: State, mask: Array) -> None:
         self.state = self.state.scatter(mask, state)
         for row, i in enumerate(np.flatnonzero(mask)):
             position, velocity = state.position[row], state.velocity[row]
             self.spaces[i].start(position, velocity, state.angle[row])
         self._steps[mask] = np.round(state.time / self.control_dt).astype(np.int64)
 
-    def step(self, command: Command) -> State:  # noqa: D102
+    def step(self, command: Command) -> State:
         old, cast, b = self.state, self.cast, self.num_worlds
         bodies = cast.bodies
         new = still_state(

@@ -1,0 +1,18 @@
+"""Ask for a new random velocity at every step."""
+
+from __future__ import annotations
+
+from marl_airhockey.driver import Driver, View
+from marl_airhockey.state import Array
+
+
+class Random(Driver):
+    """Uniform in the action box."""
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        return view.draws.uniform(-1.0, 1.0, 2), memory
+
+
+make = Random

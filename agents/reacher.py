@@ -1,0 +1,48 @@
+"""Go to the goal, with its velocity if it has one: a baseline for the reach tasks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.driver import Driver, View
+from marl_airhockey.rewards import length
+from marl_airhockey.state import Array
+
+
+@dataclass
+class Reacher(Driver):
+    """Steers to the goal; a wanted velocity is met by a run-up behind the goal.
+
+    Raises:
+        ValueError: a scenario without a goal.
+    """
+
+    gain: float = 4.0
+    """1/s: asked speed for a metre of distance."""
+    run_up: float = 0.22
+    """s before the goal at which the run begins."""
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        if "goal" not in view.recall:
+            raise ValueError("reacher: this scenario has no goal to reach")
+        own = view.state.paddle[:, view.seat]
+        top = view.top_speed[:, None]
+        goal = view.recall["goal"]
+        if "goal_velocity" not in view.recall:
+            return (goal - own) * self.gain / top, memory
+        wanted = view.recall["goal_velocity"]
+        way = goal - own
+        along = (way * wanted).sum(-1) / (wanted * wanted).sum(-1)
+        aside = length(way - along[:, None] * wanted)
+        run = (along > -0.1) & (along < 1.3 * self.run_up) & (aside < 0.03)
+        behind = goal - self.run_up * wanted
+        steer = wanted + (way - along[:, None] * wanted) * self.gain
+        prepare = (behind - own) * self.gain
+        return np.where(run[:, None], steer, prepare) / top, memory
+
+
+make = Reacher

@@ -1,0 +1,20 @@
+"""Ask for no motion at all: the floor that every success rate stands on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marl_airhockey.driver import Driver, View
+from marl_airhockey.state import Array
+
+
+class Still(Driver):
+    """Never moves."""
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        return np.zeros((len(view.draws), 2)), memory
+
+
+make = Still

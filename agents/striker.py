@@ -1,0 +1,92 @@
+"""Meet the puck where it will be and strike it at what is to be hit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.driver import Driver, View
+from marl_airhockey.rewards import length
+from marl_airhockey.state import Array
+
+
+@dataclass
+class Striker(Driver):
+    """Waits behind the meeting point and strikes through it; one puck at a time.
+
+    It aims at the goal, at the first block, or straight up the middle. A puck at rest
+    is struck where it lies.
+    """
+
+    meet_at: float = 0.22
+    """m from the near edge of the reach: where a falling puck is met."""
+    back: float = 0.07
+    """m: how far behind the contact it waits."""
+    swing: float = 0.17
+    """s before the meeting at which it strikes."""
+    pull: float = 0.94
+    """m/s2: acceleration of a falling puck that it reckons with."""
+    gain: float = 9.0
+    """1/s: asked speed for a metre of distance."""
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        state, rows = view.state, np.arange(len(view.draws))
+        own, top = state.paddle[:, view.seat], view.top_speed[:, None]
+        if not state.bodies.pucks:
+            return np.zeros_like(own), memory
+        low = view.reach[:, 0].min()
+        which = (state.puck[..., 0] + 0.4 * state.puck_velocity[..., 0]).argmin(-1)
+        puck, velocity = state.puck[rows, which], state.puck_velocity[rows, which]
+        bodies = state.bodies
+        touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
+
+        due, place = self._meeting(puck, velocity, low + self.meet_at)
+        rests = length(velocity) < 0.05
+        place = np.where(rests[:, None], puck, place)
+        out = self._target(view) - place
+        out /= np.maximum(length(out), 1e-6)[:, None]
+        came = velocity / np.maximum(length(velocity), 1e-6)[:, None]
+        normal = np.where(rests[:, None], out, out - 0.55 * came)
+        normal /= np.maximum(length(normal), 1e-6)[:, None]
+
+        contact = place - normal * touch
+        wait = contact - normal * self.back
+        away = contact - own
+        aside = length(away - (away * normal).sum(-1)[:, None] * normal)
+        ready = rests & (aside < 0.012) & ((away * normal).sum(-1) > 0.0)
+        ready &= (away * normal).sum(-1) < 0.25
+        strike = ready | (~rests & (due < self.swing))
+        through = normal * top + (away - (away * normal).sum(-1)[:, None] * normal) * 6
+        rising = ~rests & (velocity[:, 0] > 0.1) & (puck[:, 0] > own[:, 0])
+        home = np.stack([np.full(len(rows), low + 0.08), 0.6 * puck[:, 1]], -1)
+        calm = np.where((rising & (due > 0.9))[:, None], home, wait)
+        asked = np.where(strike[:, None], through, (calm - own) * self.gain)
+        return asked / top, memory
+
+    def _meeting(
+        self, puck: Array, velocity: Array, line: float
+    ) -> tuple[Array, Array]:
+        """When and where a puck comes down to a line, with banks; (W,), (W, 2)."""
+        drop = np.maximum(puck[:, 0] - line, 0.0)
+        speed = velocity[:, 0]
+        due = (speed + np.sqrt(speed * speed + 2 * self.pull * drop)) / self.pull
+        half = 0.3048 - 0.03175
+        far = puck[:, 1] + velocity[:, 1] * due + half
+        folded = half - np.abs(far % (4 * half) - 2 * half)
+        below = puck[:, 0] < line
+        x = np.where(below, puck[:, 0], line)
+        return np.where(below, 0.0, due), np.stack([x, folded], -1)
+
+    @staticmethod
+    def _target(view: View) -> Array:
+        if "goal" in view.recall:
+            return view.recall["goal"]
+        if view.state.bodies.blocks:
+            return view.state.block.mean(-2)
+        return np.broadcast_to(np.array([0.6, 0.0]), (len(view.draws), 2))
+
+
+make = Striker
