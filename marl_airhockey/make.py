@@ -54,7 +54,8 @@ def build_world(
             drivers: drivers of seats by agent, names or objects; the rest are open.
             seats: "robot" or "arcade".
             profile: "ideal" or "robot" (delays, noise, +-15 % on every parameter).
-            observe: "velocity", "history" or "pixels".
+            observe: "velocity" (in the ideal profile), "history" (in the robot
+                profile) or "pixels".
             goals: "flat" or "dict".
             physics: parameters by name, values or (low, high) drawn per episode.
             control_dt: s between two actions (0.05).
@@ -94,9 +95,9 @@ def build_world(
         )
     if max_cycles is not None and max_cycles < 1:
         raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
-    physics = Physics(
-        cast.defaults, keywords.get("profile", "ideal"), keywords.get("physics")
-    )
+    profile = keywords.get("profile", "ideal")
+    physics = Physics(cast.defaults, profile, keywords.get("physics"))
+    usual = "history" if profile == "robot" else "velocity"
     agents = [f"paddle_{i}" for i in range(len(cast.seats))]
     drivers: dict[int, Driver] = {}
     for agent, driver in keywords.get("drivers", {}).items():
@@ -109,7 +110,7 @@ def build_world(
         kind(cast, num_worlds, control_dt, substeps),
         drivers,
         physics,
-        keywords.get("observe", "velocity"),
+        keywords.get("observe", usual),
         max_cycles,
         autoreset,
     )

@@ -24,6 +24,8 @@ PADDLE, PUCK, WALL, MOUTH, BLOCK = 1, 2, 3, 4, 5
 """Collision types."""
 THICK = 0.5
 """m: a wall this thick is never passed between two substeps."""
+SQUEEZE = 0.002
+"""m: a puck that a paddle pushes deeper than this into a wall is set free."""
 POCKET = 100.0
 """m: pucks out of play wait here, far from everything."""
 
@@ -98,6 +100,7 @@ class Space:
     def _build_walls(self) -> None:
         """Boxes behind every side, with a gap and a sensor in it for a goal mouth."""
         cast, static = self.cast, self.space.static_body
+        self._lines: list[tuple[Array, float, Array, float]] = []
         self.walls: list[pymunk.Shape] = []
         for side in range(len(cast.table.vertices)):
             start, end = cast.table.ends(side)
@@ -117,6 +120,10 @@ class Space:
                 self._shapes[sensor] = cast.mouths.index(mouth)
                 self.space.add(sensor)
             cuts.append(end + along * THICK)
+            line = float(cast.table.offsets[side]) - cast.table.puck_radius
+            half = max([(m.width or 0.0) / 2 for m in gaps], default=0.0)
+            middle = (start + end) / 2
+            self._lines.append((cast.table.normals[side], line, middle, half))
             for a, b in zip(cuts[::2], cuts[1::2], strict=True):
                 wall = self._box(static, a, b, out)
                 wall.collision_type = WALL
@@ -297,16 +304,55 @@ class Space:
                 lib.cpBodySetPosition(body, tuple(back.tolist()))
 
     def _settle(self) -> None:
-        """After a contact: no puck above the speed cap, none in a mouth in play."""
-        for k in self._out:
-            self._park(k)
-        pucks = self.cast.bodies.puck
-        for body in self._raw[pucks]:
+        """After a contact: no puck in a wall, above the cap, or in a mouth in play."""
+        first = self.cast.bodies.puck.start
+        for k, body in enumerate(self._raw[self.cast.bodies.puck]):
+            if k in self._out:
+                self._park(k)
+                continue
             v = lib.cpBodyGetVelocity(body)
-            speed2 = v.x * v.x + v.y * v.y
+            vx, vy = v.x + self.kick, v.y
+            speed2 = vx * vx + vy * vy
             if speed2 > PUCK_SPEED_CAP**2:
                 share = PUCK_SPEED_CAP / speed2**0.5
-                lib.cpBodySetVelocity(body, (v.x * share, v.y * share))
+                lib.cpBodySetVelocity(body, (vx * share - self.kick, vy * share))
+            self._free(self.bodies[first + k])
+
+    def _wall(self, place: Array, depth: float) -> tuple[Array, float] | None:
+        """Normal and offset of a wall that a puck is deeper in than ``depth``, m."""
+        for normal, line, middle, half in self._lines:
+            aside = (place - middle) @ np.array([-normal[1], normal[0]])
+            if normal @ place + line < -depth and abs(aside) >= half:
+                return normal, line
+        return None
+
+    def _free(self, puck: pymunk.Body) -> None:
+        """Let a puck that a paddle squeezes into a wall slip away along the wall.
+
+        Neither wall nor paddle yields to the solver, which would push the puck into
+        the wall; in a corner the paddle is left to ride over it.
+        """
+        place = np.array(puck.position)
+        wall = self._wall(place, SQUEEZE)
+        if wall is None:
+            return
+        normal, place = wall[0], self._inside(place)
+        along = np.array([-normal[1], normal[0]])
+        touch = self.cast.table.paddle_radius + self.cast.table.puck_radius
+        for paddle in self.bodies[self.cast.bodies.paddle]:
+            gap = place - np.array(paddle.position)
+            if gap @ gap < touch**2:
+                way = np.sqrt(touch**2 - (gap @ normal) ** 2)
+                place = place + (np.copysign(way, gap @ along) - gap @ along) * along
+        place = self._inside(place)
+        puck.position = (float(place[0]), float(place[1]))
+
+    def _inside(self, place: Array) -> Array:
+        for _ in range(2):
+            wall = self._wall(place, 0.0)
+            if wall is not None:
+                place = place - (wall[0] @ place + wall[1]) * wall[0]
+        return place
 
     def _park(self, puck: int) -> None:
         body = self._raw[self.cast.bodies.puck.start + puck]

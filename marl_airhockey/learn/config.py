@@ -1,0 +1,133 @@
+"""Training configurations: presets per scenario, options on top, saved as resolved."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from marl_airhockey.physics import unknown
+from marl_airhockey.registry import scenario_names
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """All that decides a PPO run; its fields are the options of ``--set``.
+
+    Raises:
+        ValueError: a value that makes no sense, named.
+    """
+
+    scenario: str
+    seed: int = 0
+    backend: str = "pymunk"
+    profile: str = "ideal"
+    observe: str = "velocity"
+    options: dict[str, Any] = field(default_factory=dict)
+    """The scenario's own fields."""
+    drivers: dict[str, str] = field(default_factory=dict)
+    """Drivers of seats that are not learned, by agent."""
+
+    total_steps: int
+    """Steps of single worlds, over all of them."""
+    num_worlds: int
+    n_steps: int
+    """Steps of each world in a rollout."""
+    batch_size: int
+    n_epochs: int
+    learning_rate: float
+    highest_rate: float
+    """Up to here the rate is raised while the KL divergence stays low."""
+    target_kl: float
+    """The rate is halved or so above twice this, raised below half of it."""
+    gamma: float
+    gae_lambda: float
+    clip_range: float
+    ent_coef: float
+    max_grad_norm: float
+    log_std_init: float
+    hidden: list[int]
+    """Widths of the layers of actor and critic, each of its own."""
+    evaluations: int
+    """How often the policy is evaluated during training."""
+    eval_episodes: int
+    torch_threads: int = 1
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if f.type in ("int", "float") and not number:
+                raise ValueError(f"{f.name}: expected a number, got {value!r}")
+            if f.type == "int" and int(value) != value:
+                raise ValueError(f"{f.name}: expected a whole number, got {value!r}")
+            free = ("seed", "ent_coef", "log_std_init")
+            if number and f.name not in free and value <= 0:
+                raise ValueError(f"{f.name}: {value} must be above 0")
+        if not self.hidden or any(w < 1 for w in self.hidden):
+            raise ValueError(f"hidden: {self.hidden} must be widths above 0")
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """The keywords of the environments."""
+        return {
+            "backend": self.backend,
+            "profile": self.profile,
+            "observe": self.observe,
+            "options": self.options,
+            "drivers": self.drivers,
+        }
+
+    def to_toml(self) -> str:
+        """The configuration as TOML, readable by `load_config`."""
+        lines, tables = [], []
+        for name, value in asdict(self).items():
+            if isinstance(value, dict):
+                tables.append(f"\n[{name}]")
+                tables += [f"{k} = {_toml(v)}" for k, v in value.items()]
+            else:
+                lines.append(f"{name} = {_toml(value)}")
+        return "\n".join([*lines, *tables]) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return str(value)
+
+
+def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConfig:
+    """The preset of a scenario with changes on top.
+
+    Raises:
+        ValueError: an unknown scenario or field, or a bad value.
+    """
+    if scenario not in scenario_names():
+        raise ValueError(unknown("scenario", scenario, scenario_names()))
+    text = resources.files(__package__).joinpath("presets.toml").read_text()
+    presets = tomllib.loads(text)
+    known = [f.name for f in fields(TrainConfig)]
+    for name in changes or {}:
+        if name not in known:
+            raise ValueError(unknown("setting", name, known))
+    merged = {**presets["defaults"], **presets.get(scenario, {}), **(changes or {})}
+    if merged.get("profile") == "robot":
+        merged.setdefault("observe", "history")
+    return TrainConfig(**{**merged, "scenario": scenario})
+
+
+def load_config(path: Path) -> TrainConfig:
+    """Read what `TrainConfig.to_toml` wrote.
+
+    Raises:
+        ValueError: not such a file.
+    """
+    try:
+        return TrainConfig(**tomllib.loads(path.read_text()))
+    except (OSError, TypeError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path} is no training configuration: {error}") from error

@@ -1,0 +1,227 @@
+"""Play and measure: a driver in a scenario, over many episodes at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.driver import Driver
+from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.state import Array
+from marl_airhockey.world import World
+
+TEST_SEED = 2_000_000
+"""First of the seeds that training never sees."""
+
+
+@dataclass(frozen=True)
+class Deployability:
+    """How fit a driver is for a real arm, summed up in a class.
+
+    * A: violations of at most 1 minute in 100, power above 5 Hz at most 10 %,
+      decisions within 5 ms.
+    * B: at most 1 in 10, 25 %, 10 ms.   * C: at most 1 in 2, 50 %, 25 ms.   * D: else.
+    """
+
+    violations_per_minute: float
+    """Control steps in which what was asked exceeded speed, acceleration, jerk or reach,
+    a minute"""
+    jerk: float
+    """Root mean square of the sent jerk, m/s3"""
+    power_above_5hz: float
+    """Share of the power of the asked actions above 5 Hz; nan below 10 Hz of control"""
+    act_ms: float
+    """Milliseconds of CPU that a decision for one world takes, median"""
+    grade: str
+
+    @staticmethod
+    def of(
+        violations: float, jerk: float, power: float, act_ms: float, control_dt: float
+    ) -> Deployability:
+        """Sum the measures up; ``violations`` is a share of the steps."""
+        shares = {"A": (0.01, 0.10, 5.0), "B": (0.1, 0.25, 10.0), "C": (0.5, 0.5, 25.0)}
+        high = 0.0 if np.isnan(power) else power
+        grade = next(
+            (
+                name
+                for name, (v, p, ms) in shares.items()
+                if violations <= v and high <= p and act_ms <= ms
+            ),
+            "D",
+        )
+        minute = violations * 60 / control_dt
+        return Deployability(minute, jerk, power, act_ms, grade)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a driver achieved over some episodes."""
+
+    driver: str
+    scenario: str
+    backend: str
+    profile: str
+    episodes: int
+    success: float
+    success_interval: tuple[float, float]
+    """95 %, Wilson's."""
+    first_shot: float
+    """Share that succeeded before a second distinct touch."""
+    returns: float
+    length: float
+    """Control steps, mean."""
+    hits: float
+    """Distinct touches, mean."""
+    deployability: Deployability
+
+    def to_json(self) -> dict[str, Any]:
+        """For a report; `returns` is called return there."""
+        data = asdict(self)
+        data["return"] = data.pop("returns")
+        return data
+
+
+def interval(share: float, n: int) -> tuple[float, float]:
+    """95 % interval of a share of n trials (Wilson, 1927)."""
+    z = 1.96
+    middle = (share + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * np.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
+    return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+
+
+def evaluate(
+    driver: Driver,
+    name: str,
+    scenario: str,
+    episodes: int = 200,
+    seed: int = TEST_SEED,
+    keywords: Keywords | None = None,
+    others: Mapping[str, str | Driver] | None = None,
+) -> Result:
+    """Let a driver sit at ``paddle_0`` for some episodes, all at once.
+
+    Args:
+        driver: who plays.
+        name: what to call it in the result.
+        scenario: name of the scenario.
+        episodes: how many; episode i is world i's first with seed + i.
+        seed: of the first episode.
+        keywords: of the environment, see `make.build_world`.
+        others: drivers of the other seats.
+    """
+    keywords = keywords if keywords is not None else {}
+    seated: Keywords = {**keywords, "drivers": {"paddle_0": driver, **(others or {})}}
+    world = build_world(scenario, episodes, autoreset=False, keywords=seated)
+    world.reset(seed)
+    tally = _Tally(world)
+    nobody = np.zeros((episodes, 0, 2))
+    while not tally.done.all():
+        tally.add(world.step(nobody))
+    success = float(tally.success.mean())
+    result = Result(
+        driver=name,
+        scenario=scenario,
+        backend=keywords.get("backend", "pymunk"),
+        profile=keywords.get("profile", "ideal"),
+        episodes=episodes,
+        success=success,
+        success_interval=interval(success, episodes),
+        first_shot=float(tally.first_shot.mean()),
+        returns=float(tally.returns.mean()),
+        length=float(tally.length.mean()),
+        hits=float(tally.hits.mean()),
+        deployability=Deployability.of(
+            tally.violations / max(tally.length.sum(), 1),
+            tally.rms_jerk(),
+            tally.power_above(5.0),
+            _act_ms(world),
+            world.control_dt,
+        ),
+    )
+    world.close()
+    return result
+
+
+class _Tally:
+    """Counts the first episode of every world."""
+
+    def __init__(self, world: World) -> None:
+        self.world, b = world, world.num_worlds
+        self.done = np.zeros(b, np.bool_)
+        self.success, self.first_shot = np.zeros((2, b), np.bool_)
+        self.returns, self.length, self.hits = np.zeros((3, b))
+        self.violations = 0
+        self._jolts: list[Array] = []
+        self._asked: list[Array] = []
+        self._pushed = np.zeros((b, 2))
+        self._last = np.zeros((b, 2))
+
+    def add(self, step: Any) -> None:
+        """Take the step that was just made."""
+        world, live = self.world, ~self.done
+        excess, dt = step.excess, world.control_dt
+        self.length += live
+        over = excess.speed + excess.acceleration + excess.jerk + excess.reach
+        self.violations += int(((over[:, 0] > 0) & live).sum())
+        pushed = (world.sent[:, 0] - self._last) / dt
+        self._jolts.append(((pushed - self._pushed)[live] / dt).ravel())
+        self._pushed, self._last = pushed, world.sent[:, 0]
+        self._asked.append(np.where(live[:, None], world.asked[:, 0], np.nan))
+        ended = (step.terminated | step.truncated) & live
+        episode = world.episode
+        self.success[ended] = episode.success[ended, 0]
+        self.first_shot[ended] = episode.first_shot[ended]
+        self.returns[ended] = episode.returns[ended, 0]
+        if "touches" in world.memory:
+            self.hits[ended] = world.memory["touches"].sum((-1, -2))[ended]
+        self.done |= ended
+
+    def rms_jerk(self) -> float:
+        """Root mean square over all axes and steps, m/s3."""
+        jolts = np.concatenate(self._jolts)
+        return float(np.sqrt((jolts**2).mean()))
+
+    def power_above(self, frequency: float) -> float:
+        """Share of the asked actions' power above a frequency, Hz."""
+        dt = self.world.control_dt
+        if 0.5 / dt <= frequency:
+            return float("nan")
+        high = total = 0.0
+        for asked in np.stack(self._asked, 1):
+            series = asked[np.isfinite(asked[:, 0])]
+            if len(series) < 8:
+                continue
+            power = np.abs(np.fft.rfft(series - series.mean(0), axis=0)) ** 2
+            above = np.fft.rfftfreq(len(series), dt) > frequency
+            high, total = high + power[above].sum(), total + power.sum()
+        return float(high / total) if total > 0 else 0.0
+
+
+def _act_ms(world: World) -> float:
+    """Median CPU time of a decision of paddle_0 in a single world, ms."""
+    seat = world.driven[0]
+    view = seat.view(world._sensed, world.memory, world.episode.physics)
+    state = view.state.map(lambda x: x[:1])
+    seen = view.observation
+    one = {k: v[:1] for k, v in seen.items()} if isinstance(seen, Mapping) else seen[:1]
+    single = type(view)(
+        state=state,
+        observation=one,
+        labels=view.labels,
+        top_speed=view.top_speed[:1],
+        reach=view.reach,
+        draws=view.draws.select(np.array([0])),
+        seat=view.seat,
+        recall={k: v[:1] for k, v in view.recall.items()},
+    )
+    memory = seat.driver.start(world.cast.seats[0], single.draws, 1)
+    times = []
+    for _ in range(50):
+        began = time.process_time()
+        seat.driver.act(single, memory)
+        times.append(time.process_time() - began)
+    return float(np.median(times) * 1000)
