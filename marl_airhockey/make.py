@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from marl_airhockey.driver import Driver
 from marl_airhockey.physics import Physics, Value, unknown
-from marl_airhockey.registry import find_backend, make_agent, make_scenario
+from marl_airhockey.registry import find_backend, make_driver, make_scenario
 from marl_airhockey.world import World
 
 if TYPE_CHECKING:
@@ -51,7 +51,8 @@ def build_world(
         autoreset: whether worlds begin anew where an episode ended.
         keywords: all optional.
             backend: name of the physics ("pymunk").
-            drivers: drivers of seats by agent, names or objects; the rest are open.
+            drivers: drivers of seats by agent: names, paths of policies, or objects;
+                the other seats are open.
             seats: "robot" or "arcade".
             profile: "ideal" or "robot" (delays, noise, +-15 % on every parameter).
             observe: "velocity" (in the ideal profile), "history" (in the robot
@@ -103,7 +104,7 @@ def build_world(
     for agent, driver in keywords.get("drivers", {}).items():
         if agent not in agents:
             raise ValueError(unknown("agent", agent, agents))
-        built = make_agent(driver) if isinstance(driver, str) else driver
+        built = make_driver(driver) if isinstance(driver, str) else driver
         drivers[agents.index(agent)] = built
     return World(
         game,

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from gymnasium.envs.registration import register
 
-from marl_airhockey.registry import scenario_names, scenario_version
+from marl_airhockey.registry import gymnasium_id, scenario_names
 
 
 def register_all() -> None:
     """Register ``marl_airhockey/CamelCase-v0`` for every file in ``scenarios/``."""
     for name in scenario_names():
-        camel = "".join(word.capitalize() for word in name.split("_"))
         register(
-            id=f"marl_airhockey/{camel}-v{scenario_version(name)}",
+            id=gymnasium_id(name),
             entry_point="marl_airhockey.single:make_single",
             kwargs={"scenario": name},
         )

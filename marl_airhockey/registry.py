@@ -7,6 +7,7 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
@@ -32,10 +33,12 @@ def scenario_names() -> list[str]:
     return _names("scenarios")
 
 
-def scenario_version(name: str) -> int:
-    """Version of a scenario: the v of its gymnasium id."""
+def gymnasium_id(name: str) -> str:
+    """The id under which gymnasium knows a scenario, its version included."""
     module = _load("scenario", "scenarios", name, scenario_names())
-    return cast(type[Scenario], module.make).version
+    camel = "".join(word.capitalize() for word in name.split("_"))
+    version = cast(type[Scenario], module.make).version
+    return f"marl_airhockey/{camel}-v{version}"
 
 
 def agent_names() -> list[str]:
@@ -68,6 +71,20 @@ def make_agent(name: str, **options: Any) -> Driver:
     module = _load("driver", "agents", name, agent_names())
     known = list(inspect.signature(module.make).parameters)
     return cast(Driver, _build(f"option of {name}", module.make, options, known))
+
+
+def make_driver(text: str | Path) -> Driver:
+    """A driver by its name, or a policy by the path of its file or run folder.
+
+    Raises:
+        ValueError: neither the one nor the other.
+    """
+    path = Path(text)
+    if str(text) in agent_names():
+        return make_agent(str(text))
+    if path.exists() or path.suffix in (".zip", ".onnx"):
+        return make_agent("policy", path=path)
+    raise ValueError(unknown("driver", text, agent_names()) + "; or the path of a policy")
 
 
 def find_backend(name: str) -> type[Backend]:

@@ -1,0 +1,297 @@
+"""The command line: ``airhockey list | train | evaluate | watch | demo``."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from marl_airhockey.catalogue import describe, summary
+from marl_airhockey.extras import need
+from marl_airhockey.make import Keywords
+from marl_airhockey.match import Result, evaluate
+from marl_airhockey.registry import make_driver
+
+app = typer.Typer(
+    help="Air hockey for robot learning and multi-agent RL.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+console = Console()
+FLOORS = ("still", "random", "sticky")
+
+Scenario = Annotated[str, typer.Option("--scenario", "-s", help="Name of a scenario.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Backend = Annotated[str, typer.Option(help="Physics.")]
+Profile = Annotated[str, typer.Option(help="ideal, or robot: delays and noise.")]
+Options = Annotated[
+    list[str] | None,
+    typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
+]
+
+
+def settings(pairs: list[str] | None) -> dict[str, Any]:
+    """NAME=VALUE pairs; values as in TOML, bare words as strings.
+
+    Raises:
+        ValueError: a pair without "=".
+    """
+    chosen: dict[str, Any] = {}
+    for pair in pairs or []:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise ValueError(f"{pair!r}: expected NAME=VALUE")
+        try:
+            chosen[name] = tomllib.loads(f"v = {value}")["v"]
+        except tomllib.TOMLDecodeError:
+            chosen[name] = value
+    return chosen
+
+
+@app.command("list")
+def list_scenarios(
+    scenario: Annotated[str | None, typer.Argument(help="Describe this one.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """List scenarios, drivers and backends, or describe one scenario."""
+    if scenario is None:
+        data = summary()
+        if as_json:
+            console.print_json(json.dumps(data))
+            return
+        table = Table("scenario", "what", "seats", "seconds")
+        for row in data["scenarios"]:
+            table.add_row(*(str(row[k]) for k in ("name", "what", "seats", "seconds")))
+        console.print(table)
+        console.print("drivers: ", ", ".join(data["drivers"]))
+        console.print("backends:", ", ".join(data["backends"]))
+        return
+    data = describe(scenario)
+    if as_json:
+        console.print_json(json.dumps(data))
+        return
+    console.print(f"[bold]{scenario}[/bold]  {data['id']}\n{data['what']}\n")
+    for title in ("seats", "observation", "reward", "options"):
+        table = Table(*data[title][0], title=title, title_justify="left")
+        for row in data[title]:
+            table.add_row(*(str(v) for v in row.values()))
+        console.print(table)
+
+
+@app.command()
+def train(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
+    seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
+    backend: Backend = "pymunk",
+    profile: Profile = "ideal",
+    steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
+    ] = None,
+    option: Options = None,
+    resume: Annotated[Path | None, typer.Option(help="Go on with this run.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
+    need("stable_baselines3", "train")
+    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.train import train as run
+
+    if resume is None:
+        changes = settings(change) | {
+            "seed": seed,
+            "backend": backend,
+            "profile": profile,
+            "options": settings(option),
+        }
+        if steps is not None:
+            changes["total_steps"] = steps
+        config = preset(scenario, changes)
+        folder = out or Path("runs") / f"{scenario}-{seed}"
+    else:
+        if scenario or change or option or steps or out:
+            raise ValueError("--resume goes on as the run was begun: give nothing else")
+        config, folder = None, resume
+    with bar() as progress:
+        task = progress.add_task(folder.name, total=None, note="")
+
+        def report(done: int, total: int, row: dict[str, float]) -> None:
+            note = f"success {row['success']:.2f}" if row else ""
+            progress.update(task, completed=done, total=total, note=note)
+
+        row = run(config, folder, report)
+    if as_json:
+        console.print_json(json.dumps({"run": str(folder), **row}))
+        return
+    console.print(
+        f"{folder}: success {row['success']:.3f} (sampled {row['success_sampled']:.3f}) "
+        f"after {row['steps']:,} steps and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
+    )
+    name = scenario or "SCENARIO"
+    console.print(f"next: airhockey evaluate {folder} --scenario {name}")
+
+
+@app.command("evaluate")
+def evaluate_driver(
+    driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
+    scenario: Scenario,
+    backend: Backend = "pymunk",
+    profile: Profile = "ideal",
+    episodes: Annotated[int, typer.Option(help="How many.")] = 200,
+    seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
+    option: Options = None,
+    floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
+    as_json: AsJson = False,
+) -> None:
+    """Measure a driver over episodes that training never sees."""
+    keywords: Keywords = {
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+    }
+    if episodes < 1:
+        raise ValueError(f"--episodes: {episodes} must be at least 1")
+    seeds = {} if seed is None else {"seed": seed}
+    seated = make_driver(driver)
+    entries = [(driver, seated)]
+    if hasattr(seated, "deterministic"):
+        entries.append((f"{driver} (sampled)", dataclasses.replace(seated, deterministic=False)))
+    if floors:
+        entries += [(f, make_driver(f)) for f in FLOORS if f != driver]
+    results: list[Result] = []
+    with bar() as progress:
+        task = progress.add_task(scenario, total=len(entries), note="")
+        for name, entry in entries:
+            progress.update(task, note=name)
+            results.append(
+                evaluate(entry, name, scenario, episodes, keywords=keywords, **seeds)
+            )
+            progress.advance(task)
+    if as_json:
+        main_result = results[0].to_json()
+        for result in results[1:]:
+            key = "sampled" if "(sampled)" in result.driver else result.driver
+            main_result.setdefault("beside", {})[key] = result.to_json()
+        console.print_json(json.dumps(main_result))
+        return
+    console.print(result_table(results))
+
+
+def result_table(results: list[Result]) -> Table:
+    """Results side by side, one column a driver."""
+    first = results[0]
+    table = Table(
+        title=f"{first.scenario} on {first.backend}, {first.profile} profile, "
+        f"{first.episodes} episodes",
+    )
+    table.add_column("")
+    for result in results:
+        table.add_column(result.driver, justify="right")
+    lines = {
+        "success": lambda r: f"{r.success:.3f}",
+        "95 % interval": lambda r: "{:.3f}..{:.3f}".format(*r.success_interval),
+        "first-shot success": lambda r: f"{r.first_shot:.3f}",
+        "return": lambda r: f"{r.returns:.2f}",
+        "control steps": lambda r: f"{r.length:.0f}",
+        "touches": lambda r: f"{r.hits:.1f}",
+        "violations a minute": lambda r: f"{r.deployability.violations_per_minute:.0f}",
+        "jerk, m/s3": lambda r: f"{r.deployability.jerk:.0f}",
+        "power above 5 Hz": lambda r: f"{r.deployability.power_above_5hz:.2f}",
+        "ms an action": lambda r: f"{r.deployability.act_ms:.2f}",
+        "deployability": lambda r: r.deployability.grade,
+    }
+    for name, line in lines.items():
+        table.add_row(name, *(line(result) for result in results))
+    return table
+
+
+@app.command()
+def watch(
+    driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
+    scenario: Scenario,
+    backend: Backend = "pymunk",
+    profile: Profile = "ideal",
+    seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
+    episodes: Annotated[int, typer.Option(help="How many.")] = 1,
+    video: Annotated[
+        Path | None, typer.Option(help="Write a .gif or .mp4 instead of a window.")
+    ] = None,
+    option: Options = None,
+) -> None:
+    """Watch a driver play, in a window or as a video."""
+    from marl_airhockey.film import film
+
+    keywords: Keywords = {
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+    }
+    film(scenario, make_driver(driver), keywords, seed, episodes, video)
+    if video is not None:
+        console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for what it makes.")] = Path(
+        "runs/demo"
+    ),
+    scenario: Annotated[str, typer.Option(help="What to learn.")] = "juggle",
+    steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+) -> None:
+    """Train a paddle to juggle, measure it, and show what it learned."""
+    need("stable_baselines3", "train")
+    from marl_airhockey.learn.demo import run
+
+    with bar() as progress:
+        task = progress.add_task(f"learning to {scenario}", total=None, note="")
+
+        def report(done: int, total: int, row: dict[str, float]) -> None:
+            note = f"success {row['success']:.2f}" if row else ""
+            progress.update(task, completed=done, total=total, note=note)
+
+        results, files = run(scenario, out, steps, report)
+    console.print(result_table(results))
+    for what, path in files.items():
+        console.print(f"{what:>16}: {path}")
+    console.print(
+        "\ntry next:\n"
+        f"  airhockey watch {out / 'run'} --scenario {scenario}\n"
+        "  airhockey train hit_goal && airhockey evaluate runs/hit_goal-0 -s hit_goal\n"
+        "  airhockey list"
+    )
+
+
+def bar() -> Progress:
+    """A progress bar on standard error, so that output can be piped."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=Console(stderr=True),
+    )
+
+
+def main() -> None:
+    """Run the command line; bad input gives one line and exit status 1."""
+    try:
+        app()
+    except (ValueError, RuntimeError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
