@@ -85,7 +85,7 @@ class Striker(Driver):
         if "goal" in view.recall:
             return view.recall["goal"]
         if view.state.bodies.blocks:
-            return view.state.block.mean(-2)
+            return np.asarray(view.state.block.mean(-2))
         return np.broadcast_to(np.array([0.6, 0.0]), (len(view.draws), 2))
 
 

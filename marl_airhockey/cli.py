@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,8 +17,8 @@ from rich.table import Table
 from marl_airhockey.catalogue import describe, summary
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
-from marl_airhockey.match import Result, evaluate
-from marl_airhockey.registry import make_driver
+from marl_airhockey.match import TEST_SEED, Result, evaluate
+from marl_airhockey.registry import agent_names, make_agent, make_driver
 
 app = typer.Typer(
     help="Air hockey for robot learning and multi-agent RL.",
@@ -134,8 +134,9 @@ def train(
         console.print_json(json.dumps({"run": str(folder), **row}))
         return
     console.print(
-        f"{folder}: success {row['success']:.3f} (sampled {row['success_sampled']:.3f}) "
-        f"after {row['steps']:,} steps and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
+        f"{folder}: success {row['success']:.3f} "
+        f"(sampled {row['success_sampled']:.3f}) after {row['steps']:,} steps "
+        f"and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
     )
     name = scenario or "SCENARIO"
     console.print(f"next: airhockey evaluate {folder} --scenario {name}")
@@ -148,7 +149,7 @@ def evaluate_driver(
     backend: Backend = "pymunk",
     profile: Profile = "ideal",
     episodes: Annotated[int, typer.Option(help="How many.")] = 200,
-    seed: Annotated[int | None, typer.Option(help="Of the first episode.")] = None,
+    seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,
     option: Options = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     as_json: AsJson = False,
@@ -161,11 +162,11 @@ def evaluate_driver(
     }
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
-    seeds = {} if seed is None else {"seed": seed}
     seated = make_driver(driver)
     entries = [(driver, seated)]
-    if hasattr(seated, "deterministic"):
-        entries.append((f"{driver} (sampled)", dataclasses.replace(seated, deterministic=False)))
+    if driver not in agent_names():
+        policy = make_agent("policy", path=driver, deterministic=False)
+        entries.append((f"{driver} (sampled)", policy))
     if floors:
         entries += [(f, make_driver(f)) for f in FLOORS if f != driver]
     results: list[Result] = []
@@ -173,9 +174,7 @@ def evaluate_driver(
         task = progress.add_task(scenario, total=len(entries), note="")
         for name, entry in entries:
             progress.update(task, note=name)
-            results.append(
-                evaluate(entry, name, scenario, episodes, keywords=keywords, **seeds)
-            )
+            results.append(evaluate(entry, name, scenario, episodes, seed, keywords))
             progress.advance(task)
     if as_json:
         main_result = results[0].to_json()
@@ -197,9 +196,9 @@ def result_table(results: list[Result]) -> Table:
     table.add_column("")
     for result in results:
         table.add_column(result.driver, justify="right")
-    lines = {
+    lines: dict[str, Callable[[Result], str]] = {
         "success": lambda r: f"{r.success:.3f}",
-        "95 % interval": lambda r: "{:.3f}..{:.3f}".format(*r.success_interval),
+        "95 % interval": lambda r: "..".join(f"{v:.3f}" for v in r.success_interval),
         "first-shot success": lambda r: f"{r.first_shot:.3f}",
         "return": lambda r: f"{r.returns:.2f}",
         "control steps": lambda r: f"{r.length:.0f}",

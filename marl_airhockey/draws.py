@@ -21,7 +21,7 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 def _mix(z: Array) -> Array:
     z = (z ^ (z >> np.uint64(30))) * _MIX_1
     z = (z ^ (z >> np.uint64(27))) * _MIX_2
-    return z ^ (z >> np.uint64(31))
+    return np.asarray(z ^ (z >> np.uint64(31)))
 
 
 def _keys(seeds: Array, episodes: Array, purpose: str) -> Array:
@@ -60,7 +60,7 @@ class Draws:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def select(self, rows: Array) -> Draws:
+    def select(self, rows: Array | slice) -> Draws:
         """The streams of ``rows`` (a mask or indices into these rows)."""
         return Draws(self._keys, self._counts, self._rows[rows])
 

@@ -7,7 +7,6 @@ controller) and the backend follows.
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import TracebackType
@@ -44,7 +43,7 @@ Told = Array
 """(B, 4) measured position and velocity of a paddle, ego frame, m and m/s."""
 
 
-class Driver(ABC):
+class Driver:
     """Drives one seat in B worlds.
 
     Policies and scripts are pure: what they keep between steps is the memory, arrays
@@ -70,7 +69,7 @@ class Driver(ABC):
         raise NotImplementedError(f"{type(self).__name__} does not ask")
 
     def measured(self) -> Told | None:
-        """(B, 4) where the paddle is, for a driver that tells; None for one that asks."""
+        """(B, 4) where the paddle is, if the driver tells; None if it asks."""
         return None
 
     def __enter__(self) -> Self:

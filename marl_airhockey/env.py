@@ -27,7 +27,7 @@ Dicts = tuple[
 ]
 
 
-class AirHockeyEnv(ParallelEnv[str, Any, Any]):
+class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """One world of a scenario; the open seats are the agents, ``paddle_0`` and so on.
 
     All agents stay to the end of the episode and end together. ``info`` of an agent
@@ -41,7 +41,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):
         **keywords: see `make.build_world`.
     """
 
-    metadata: dict[str, Any] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo declares it so
         "name": "marl_airhockey",
         "render_modes": ["human", "rgb_array"],
         "is_parallelizable": True,

@@ -14,7 +14,6 @@ import numpy as np
 from marl_airhockey.state import Array
 from marl_airhockey.table import Seat, Table, half_planes
 
-
 JERK = 40.0
 """1/s: a jerk is excessive beyond this times the acceleration limit, which is a full
 reversal of the acceleration within one 50 ms control step."""

@@ -28,8 +28,8 @@ class Deployability:
     """
 
     violations_per_minute: float
-    """Control steps in which what was asked exceeded speed, acceleration, jerk or reach,
-    a minute"""
+    """Control steps a minute in which what was asked exceeded speed, acceleration,
+    jerk or reach"""
     jerk: float
     """Root mean square of the sent jerk, m/s3"""
     power_above_5hz: float

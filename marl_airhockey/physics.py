@@ -6,7 +6,7 @@ A parameter is a number, or a range ``(low, high)`` drawn anew for every episode
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,9 +132,9 @@ def _checked(name: str, value: Value) -> tuple[float, float]:
     return low, high
 
 
-def unknown(what: str, name: object, known: Mapping[str, object] | object) -> str:
+def unknown(what: str, name: object, known: Iterable[object]) -> str:
     """A message that names what is unknown and lists what exists, closest first."""
-    names = [str(n) for n in known]  # type: ignore[attr-defined]
+    names = [str(n) for n in known]
     ratio = {n: difflib.SequenceMatcher(None, str(name), n).ratio() for n in names}
     ranked = sorted(names, key=lambda n: (-ratio[n], n))
     return f"unknown {what} {name!r}; there are: {', '.join(ranked)}"

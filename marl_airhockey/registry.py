@@ -84,7 +84,9 @@ def make_driver(text: str | Path) -> Driver:
         return make_agent(str(text))
     if path.exists() or path.suffix in (".zip", ".onnx"):
         return make_agent("policy", path=path)
-    raise ValueError(unknown("driver", text, agent_names()) + "; or the path of a policy")
+    raise ValueError(
+        unknown("driver", text, agent_names()) + "; or the path of a policy"
+    )
 
 
 def find_backend(name: str) -> type[Backend]:

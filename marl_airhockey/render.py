@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.physics import unknown
@@ -32,7 +34,12 @@ SEAT_COLOURS: tuple[Colour, ...] = (
 """RGB; Okabe and Ito's palette, which colour-blind people can tell apart."""
 ROOM, RAIL, FIELD = (236, 239, 243), (52, 62, 76), (250, 251, 253)
 PRINT, FAINT, INK = (168, 196, 224), (214, 226, 238), (34, 40, 49)
-PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (46, 52, 64), (20, 24, 31), (222, 184, 112), (150, 112, 50)
+PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
+    (46, 52, 64),
+    (20, 24, 31),
+    (222, 184, 112),
+    (150, 112, 50),
+)
 GOAL = (200, 60, 90)
 SMOOTH = 2
 """Drawn this many times larger, then averaged."""
@@ -83,9 +90,7 @@ class Canvas:
     ) -> None:
         """A filled disc, m."""
         size = max(round(radius * self.scale * 2**SHIFT), 1)
-        cv2.circle(
-            self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT
-        )
+        cv2.circle(self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT)
 
     def ring(
         self,
@@ -118,13 +123,13 @@ class Canvas:
         points = np.array([self.pixel(c) for c in corners], np.int32)
         if width:
             wide = max(round(width * SMOOTH), 1)
-            cv2.polylines(
-                self.image, [points], True, colour, wide, cv2.LINE_AA, SHIFT
-            )
+            cv2.polylines(self.image, [points], True, colour, wide, cv2.LINE_AA, SHIFT)
         else:
             cv2.fillPoly(self.image, [points], colour, cv2.LINE_AA, SHIFT)
 
-    def text(self, words: str, x: int, size: float, colour: Colour, right: bool) -> None:
+    def text(
+        self, words: str, x: int, size: float, colour: Colour, right: bool
+    ) -> None:
         """Words in the title bar, ``x`` pixels from its left or right end."""
         font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
         scale = size * SMOOTH
@@ -176,9 +181,7 @@ def _table(canvas: Canvas, cast: Cast) -> None:
         start, end = table.ends(mouth.side)
         along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
         middle, out = (start + end) / 2, -0.04 * table.normals[mouth.side]
-        owner = next(
-            (i for i, s in enumerate(cast.seats) if s.side == mouth.side), 0
-        )
+        owner = next((i for i, s in enumerate(cast.seats) if s.side == mouth.side), 0)
         gap = np.array(
             [middle - along, middle + along, middle + along + out, middle - along + out]
         )
@@ -200,10 +203,8 @@ def _mark(canvas: Canvas, mark: Mark) -> None:
             canvas.polygon(head, GOAL)
 
 
-def _trail(
-    canvas: Canvas, trail: Sequence[tuple[float, float]], radius: float
-) -> None:
-    for i, (a, b) in enumerate(zip(trail[:-1], trail[1:], strict=True)):
+def _trail(canvas: Canvas, trail: Sequence[tuple[float, float]], radius: float) -> None:
+    for i, (a, b) in enumerate(pairwise(trail)):
         age = (i + 1) / len(trail)
         if np.hypot(b[0] - a[0], b[1] - a[1]) < 0.4:
             wide = age * radius * canvas.scale / SMOOTH
@@ -305,7 +306,7 @@ def small_picture(
 
 @dataclass
 class Renderer:
-    """Shows world 0 of an environment, with trails; in a window if ``mode`` is human."""
+    """Shows one world of an environment, in a window if ``mode`` is human."""
 
     world: Any
     """A `world.World`."""
@@ -388,22 +389,24 @@ def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path
     if not pictures:
         raise ValueError("video: no pictures to write")
     path.parent.mkdir(parents=True, exist_ok=True)
-    frames = [cv2.cvtColor(p, cv2.COLOR_RGB2BGR) for p in pictures]
     if path.suffix == ".gif":
-        animation = cv2.Animation()
-        animation.frames = frames
-        animation.durations = np.full(len(frames), round(1000 / fps), np.int32)
-        good = cv2.imwriteanimation(str(path), animation)
+        # One palette and no dithering: frames then differ only where things move.
+        palette = Image.fromarray(pictures[0]).quantize(128)
+        frames = [
+            Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
+            for p in pictures
+        ]
+        rest, lasts = frames[1:], round(1000 / fps)
+        frames[0].save(path, append_images=rest, save_all=True, duration=lasts, loop=0)
     elif path.suffix == ".mp4":
-        size = (frames[0].shape[1], frames[0].shape[0])
+        size = (pictures[0].shape[1], pictures[0].shape[0])
         code = cv2.VideoWriter.fourcc(*"mp4v")
         writer = cv2.VideoWriter(str(path), code, fps, size)
-        good = writer.isOpened()
-        for frame in frames:
-            writer.write(frame)
+        if not writer.isOpened():
+            raise OSError(f"video: {path} could not be written")
+        for picture in pictures:
+            writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
         writer.release()
     else:
         raise ValueError(f"video: {path.name!r} must end in .gif or .mp4")
-    if not good:
-        raise OSError(f"video: {path} could not be written")
     return path

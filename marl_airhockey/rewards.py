@@ -159,7 +159,7 @@ def enters(
         wanted = velocity[..., None, :]
         error = length(puck[..., 2:] - wanted)
         inside &= alike(puck[..., 2:], wanted, angle, speed_share, speed_slack)
-    return inside.any(-1), gap, error
+    return np.asarray(inside.any(-1)), gap, error
 
 
 def jitter(before: State, sent: Array, top_speed: Array | float) -> Array:

@@ -49,9 +49,7 @@ class Driven:
         """Begin an episode in the worlds of a mask."""
         self._draws.renew(mask, seeds, episodes, f"driver {self.index}")
         self._held[mask] = 0.0
-        rows = self.driver.start(
-            self._seat, self._draws.select(mask), int(mask.sum())
-        )
+        rows = self.driver.start(self._seat, self._draws.select(mask), int(mask.sum()))
         for name, row in rows.items():
             if name not in self._memory:
                 self._memory[name] = np.zeros((len(mask), *row.shape[1:]), row.dtype)

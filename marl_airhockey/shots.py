@@ -19,11 +19,11 @@ TRIES = 20
 def legal_shots(draws: Draws, cast: Cast) -> tuple[Array, Array]:
     """Draw falling pucks and for each a moment of a shot that a robot seat can play.
 
-    The puck falls to x in -0.65 .. -0.30, is struck with a contact normal within 0.5 rad
-    of straight up and a normal paddle speed of 0 .. 0.6 m/s, the paddle's centre lying
-    in x -0.74 .. -0.38 and |y| <= 0.24, and rolls on with banks. The moment is a random
-    one of that path with x 0.05 .. 0.738, |y| < 0.205, within 30 deg of straight up and
-    vx at least 0.5 m/s.
+    The puck falls to x in -0.65 .. -0.30 and is struck there with a contact normal
+    within 0.5 rad of straight up and a normal paddle speed of 0 .. 0.6 m/s, the
+    paddle's centre lying in x -0.74 .. -0.38 and |y| <= 0.24; it rolls on with banks.
+    The moment is a random one of that path with x 0.05 .. 0.738, |y| < 0.205, within
+    30 deg of straight up and vx at least 0.5 m/s.
 
     Returns:
         (W, 4) x, y, vx, vy of the puck at its start, and (W, 4) of the moment.

@@ -56,12 +56,11 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Move by one control step; see `AirHockeyEnv` for the info."""
-        result = self.parallel.step({self.agent: action})
-        observation, reward, terminated, truncated, info = (
-            part[self.agent] for part in result
-        )
-        info["is_success"] = info["success"]
-        return observation, reward, terminated, truncated, info
+        seen, reward, ended, cut, info = self.parallel.step({self.agent: action})
+        me = self.agent
+        # The name under which stable-baselines3 looks for it.
+        info[me]["is_success"] = info[me]["success"]
+        return seen[me], reward[me], ended[me], cut[me], info[me]
 
     def render(self) -> Any:
         """A picture (H, W, 3) uint8 for "rgb_array"."""

@@ -138,7 +138,7 @@ class State:
 
     def map(self, change: Callable[[Array], Array]) -> State:
         """The state with ``change`` applied to every array: pick rows, stack times."""
-        arrays = {name: change(getattr(self, name)) for name in ARRAYS}
+        arrays: dict[str, Any] = {n: change(getattr(self, n)) for n in ARRAYS}
         if self.path is not None:
             arrays["path"] = change(self.path)
         extra = {name: change(value) for name, value in self.extra.items()}
@@ -146,7 +146,7 @@ class State:
 
     def scatter(self, mask: Array, rows: State) -> State:
         """A copy in which the worlds of ``mask`` (B,) hold ``rows``, in order."""
-        arrays: dict[str, Array] = {}
+        arrays: dict[str, Any] = {}
         for name in (*ARRAYS, *(("path",) if self.path is not None else ())):
             arrays[name] = getattr(self, name).copy()
             arrays[name][mask] = getattr(rows, name)

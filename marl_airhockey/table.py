@@ -85,12 +85,13 @@ class Table:
     @cached_property
     def offsets(self) -> Array:
         """(sides,) distance of each side from the origin, m."""
-        return -np.einsum("kd,kd->k", self.normals, np.asarray(self.vertices))
+        inward = (self.normals * np.asarray(self.vertices)).sum(-1)
+        return np.asarray(-inward)
 
     @cached_property
     def size(self) -> Array:
         """(2,) extent of the bounding box, m."""
-        return np.ptp(np.asarray(self.vertices), axis=0)
+        return np.asarray(np.ptp(np.asarray(self.vertices), axis=0))
 
     def ends(self, side: int) -> tuple[Array, Array]:
         """The two corners of a side, (2,) each."""

@@ -28,13 +28,12 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         **keywords: see `make.build_world`.
     """
 
-    metadata: dict[str, Any] = {"autoreset_mode": AutoresetMode.SAME_STEP}
-
     def __init__(
         self, scenario: str, num_envs: int = 1, **keywords: Unpack[Keywords]
     ) -> None:
         self.world = build_world(scenario, num_envs, autoreset=True, keywords=keywords)
         check_one_open(scenario, [f"paddle_{i}" for i in self.world.open])
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
         self.num_envs = num_envs
         self.render_mode = None
         self.single_observation_space = observation_space(self.world.observer)
@@ -50,9 +49,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
             raise ValueError("seed: give one number; world i gets seed + i")
         return _rows(self.world.reset(seed)), {}
 
-    def step(
-        self, actions: Array
-    ) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
+    def step(self, actions: Array) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
         """Move all worlds by one control step; actions (B, 2)."""
         result = self.world.step(np.asarray(actions)[:, None])
         info = self._info(result)

@@ -1,4 +1,4 @@
-"""The stable-baselines3 VecEnv over B worlds: each open seat of each world is a slot."""
+"""The stable-baselines3 VecEnv over B worlds: one slot for each open seat of each."""
 
 from __future__ import annotations
 
@@ -41,9 +41,7 @@ class AirHockeyVecEnv(VecEnv):
         slots = num_worlds * self.seats
         self._returns, self._lengths = np.zeros(slots), np.zeros(slots, np.int64)
         self._actions = np.zeros((num_worlds, self.seats, 2))
-        super().__init__(
-            slots, observation_space(self.world.observer), action_space()
-        )
+        super().__init__(slots, observation_space(self.world.observer), action_space())
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """World i gets seed + i at the next reset."""

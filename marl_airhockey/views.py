@@ -15,6 +15,7 @@ import numpy as np
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.physics import PUCK_SPEED_CAP, unknown
+from marl_airhockey.rewards import touched
 from marl_airhockey.state import Array, Memory, State
 
 OBSERVE = ("velocity", "history", "pixels")
@@ -62,7 +63,9 @@ class Scope:
         """Numbers shown of each puck."""
         return 4 if self.observe == "velocity" else 3 * HISTORY
 
-    def place(self, name: str, unit: tuple[float, float], x: float = 0.0) -> list[Column]:
+    def place(
+        self, name: str, unit: tuple[float, float], x: float = 0.0
+    ) -> list[Column]:
         """Columns of a position, centred at (x, 0)."""
         ex, ey = self.extent
         return [
@@ -275,7 +278,7 @@ class Touched(Piece):
         return [Column("touched", 0.0, 1.0, 1.0)]
 
     def read(self, ego: Ego) -> Array:
-        flag = (ego.memory["touches"] > 0).any((-1, -2))[..., None]
+        flag = touched(ego.memory)[..., None]
         seats = len(ego.scope.cast.seats)
         return np.broadcast_to(flag, (*flag.shape[:-1], seats))[..., None]
 
@@ -372,4 +375,3 @@ class Layout:
             out[..., part] = piece.read(ego)
         np.maximum(out, self.low, out=out)
         return np.minimum(out, self.high, out=out)
-

@@ -163,8 +163,8 @@ class World:
         drawn = self.physics.draw(self._streams["physics"].select(mask))
         if not episode.physics:
             episode.physics = {k: np.zeros(self.num_worlds) for k in drawn}
-        for name, rows in drawn.items():
-            episode.physics[name][mask] = rows
+        for name, value in drawn.items():
+            episode.physics[name][mask] = value
         self.backend.set_physics(episode.physics, mask)
         rows, memory = self.scenario.start(self._streams["start"].select(mask), w)
         self._place(mask, rows, memory)
@@ -267,9 +267,7 @@ class World:
             told[:, seat.index, 2:] = place[:, 2:] @ turn
         return asked, told
 
-    def _count(
-        self, terms: dict[str, Array], terminated: Array
-    ) -> tuple[Array, Array]:
+    def _count(self, terms: dict[str, Array], terminated: Array) -> tuple[Array, Array]:
         """Update the counters; the truncations (B,) and rewards (B, seats)."""
         episode = self.episode
         episode.cycles += 1

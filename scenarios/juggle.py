@@ -75,7 +75,7 @@ class Juggle(Scenario):
         }
 
     def terminated(self, after: State, memory: Memory) -> Array:
-        return after.crossed[..., 0].any(-1)
+        return np.asarray(after.crossed[..., 0].any(-1))
 
     def success(self, after: State, memory: Memory) -> Array:
         return np.asarray(memory["hits"] >= self.hits)

@@ -48,7 +48,7 @@ class MoveBlock(Scenario):
 
         def aside(rows: Array) -> Array:
             # The puck must not fall onto the block.
-            return np.abs(rows[:, 1] - state.puck[:, 0, 1]) >= 0.09
+            return np.asarray(np.abs(rows[:, 1] - state.puck[:, 0, 1]) >= 0.09)
 
         state.block[:, 0] = starts.redraw(draws, sample, aside)
         return state, {

@@ -49,7 +49,10 @@ def run(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
         found = evaluate(policy, name, scenario, EPISODES, keywords=keywords)
         row[name] = found.success
         if mean:
-            row["first_shot"], row["grade"] = found.first_shot, found.deployability.grade
+            row["first_shot"], row["grade"] = (
+                found.first_shot,
+                found.deployability.grade,
+            )
     with (folder / "evaluations.csv").open() as file:
         curve = list(csv.DictReader(file))
     row["cpu_minutes"] = float(curve[-1]["cpu_seconds"]) / 60

@@ -14,8 +14,8 @@ import pymunk.batch
 from pymunk._chipmunk_cffi import ffi, lib
 
 from marl_airhockey.backend import TOLD_SPEED, Backend, Command
-from marl_airhockey.paddles import meet
 from marl_airhockey.cast import Cast
+from marl_airhockey.paddles import meet
 from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.state import Array, State, still_state
 from marl_airhockey.table import GRAVITY
@@ -142,7 +142,7 @@ class Space:
 
     @staticmethod
     def _box(static: pymunk.Body, a: Array, b: Array, out: Array) -> pymunk.Poly:
-        corners = [tuple(map(float, p)) for p in (a, b, b + out, a + out)]
+        corners = [(float(x), float(y)) for x, y in (a, b, b + out, a + out)]
         box = pymunk.Poly(static, corners)
         box.friction = 0.0
         return box
@@ -185,13 +185,14 @@ class Space:
     def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         puck, mouth = arbiter.shapes
         pair = self._shapes[puck], self._shapes[mouth]
+        body = self.bodies[self.cast.bodies.puck.start + pair[0]]
         if pair[0] in self._out:
             return
         self.crossed[pair] = True
-        self.crossed_velocity[pair] = puck.body.velocity
+        self.crossed_velocity[pair] = body.velocity
         self._events = True
         if mouth.sensor:
-            self._out[pair[0]] = puck.body.position
+            self._out[pair[0]] = body.position
 
     def set_physics(self, values: dict[str, float]) -> None:
         """Set the parameters of this world, by name."""
@@ -207,14 +208,15 @@ class Space:
             body.mass = values["puck_mass"]
         mass, grip = values["block_mass"], values["block_friction"]
         half = self.cast.block_radius
-        for i, shape in enumerate(self.blocks):
+        bodies = self.bodies[self.cast.bodies.block]
+        for i, (body, shape) in enumerate(zip(bodies, self.blocks, strict=True)):
             shape.elasticity = values["block_restitution"]
-            shape.body.mass = mass
+            body.mass = mass
             self._grips[2 * i].max_force = mass * grip
             # The mean distance of a square's points from its centre is 0.765 halves.
             self._grips[2 * i + 1].max_force = mass * grip * 0.765 * half
             if self.cast.block_shape == "square":
-                shape.body.moment = mass * (2 * half) ** 2 / 6
+                body.moment = mass * (2 * half) ** 2 / 6
 
     def start(self, position: Array, velocity: Array, angle: Array) -> None:
         """Put every mover (movers, 2) at a place with a velocity; forget all contacts.
@@ -290,7 +292,9 @@ class Space:
         for k in self._out:
             self._park(k)
 
-    def _drive(self, position: Array, velocity: Array, ramp: Array, told: Array) -> None:
+    def _drive(
+        self, position: Array, velocity: Array, ramp: Array, told: Array
+    ) -> None:
         """Move several paddles by a substep, letting them meet."""
         mean = velocity + 0.5 * ramp
         position += mean * self.sim_dt
@@ -445,7 +449,7 @@ class Pymunk(Backend):
         self, position: Array, told: Array, goal: Array
     ) -> tuple[Array, Array, Array]:
         """Velocities, who is told and who is lifted, for a command with told seats."""
-        is_told = np.isfinite(told).all(-1)
+        is_told = np.asarray(np.isfinite(told).all(-1))
         way = (told[..., :2] - position) / self.control_dt
         lifted = is_told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
         for i, k in zip(*np.nonzero(lifted), strict=True):
@@ -462,9 +466,9 @@ class Pymunk(Backend):
     def _read_turns(self, new: State) -> None:
         first = self.cast.bodies.block.start
         for i, space in enumerate(self.spaces):
-            for k, shape in enumerate(space.blocks):
-                new.angle[i, first + k] = shape.body.angle
-                new.spin[i, first + k] = shape.body.angular_velocity
+            for k, body in enumerate(space.bodies[first:], start=first):
+                new.angle[i, k] = body.angle
+                new.spin[i, k] = body.angular_velocity
 
 
 make = Pymunk

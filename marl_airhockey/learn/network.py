@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
@@ -17,11 +19,15 @@ class FixedScale(BaseFeaturesExtractor):
     """
 
     def __init__(
-        self, observation_space: spaces.Space, centre: list[float], unit: list[float]
+        self,
+        observation_space: spaces.Space[Any],
+        centre: list[float],
+        unit: list[float],
     ) -> None:
-        self.dicts = isinstance(observation_space, spaces.Dict)
         size = spaces.flatdim(observation_space)
         super().__init__(observation_space, size)
+        self.centre: torch.Tensor
+        self.rate: torch.Tensor
         self.register_buffer("centre", torch.tensor(centre))
         self.register_buffer("rate", 1.0 / torch.tensor(unit))
 

@@ -36,8 +36,8 @@ def learning_curve(
     ):
         share = [0.0, *(float(row[name]) for row in rows)]
         axes.plot(cpu, share, color=ink, marker="o", markersize=4, label=label)
-    for (name, share), ink in zip(floors.items(), FLOOR_INKS, strict=False):
-        axes.axhline(share, color=ink, linestyle="--", linewidth=1.2, label=name)
+    for (name, level), ink in zip(floors.items(), FLOOR_INKS, strict=False):
+        axes.axhline(level, color=ink, linestyle="--", linewidth=1.2, label=name)
     axes.set(
         xlabel="CPU-seconds of training",
         ylabel="success",

@@ -42,7 +42,7 @@ class Policy(Driver):
         seen = view.observation
         if not isinstance(seen, Mapping) and self.shape not in (None, seen.shape[1:]):
             raise ValueError(
-                f"{self.source}: the policy expects observations of shape {self.shape}, "
+                f"{self.source}: it expects observations of shape {self.shape}, "
                 f"this environment gives {seen.shape[1:]}; it was trained on another "
                 "scenario, or with other options (observe, goals, seats)"
             )
@@ -85,7 +85,7 @@ def _load_sb3(path: Path, deterministic: bool) -> Policy:
         module = data["policy_class"]["__module__"]
     except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{wrong} ({error})") from error
-    families = {"sac": sb3.SAC, "td3": sb3.TD3, "common": sb3.PPO}
+    families: dict[str, Any] = {"sac": sb3.SAC, "td3": sb3.TD3, "common": sb3.PPO}
     kinds = [kind for name, kind in families.items() if f".{name}." in module]
     if not kinds:
         raise ValueError(f"{wrong} of PPO, A2C, SAC, TD3 or DDPG (found {module})")

@@ -99,7 +99,11 @@ class Keeper(BaseCallback):
     """Evaluates, keeps the best and the last policy, and logs, as training goes on."""
 
     def __init__(
-        self, config: TrainConfig, folder: Path, progress: Progress, rate: Rate,
+        self,
+        config: TrainConfig,
+        folder: Path,
+        progress: Progress,
+        rate: Rate,
         report: Report | None,
     ) -> None:
         super().__init__()
@@ -230,7 +234,7 @@ def train(
         (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
         progress = Progress()
     rate = Rate(config, progress.rate or config.learning_rate)
-    env = make_sb3_vec(config.scenario, config.num_worlds, **config.keywords)  # type: ignore[arg-type]
+    env = make_sb3_vec(config.scenario, config.num_worlds, **config.keywords)
     env.seed(config.seed * 10_000 + progress.steps % 10_000)
     if resumed and (folder / "last.zip").exists():
         model = PPO.load(folder / "last.zip", env, device="cpu")
@@ -288,11 +292,12 @@ def build(config: TrainConfig, env: AirHockeyVecEnv, rate: Rate) -> PPO:
         },
     )
     # Saved with the model, so that the file alone says what it wants to see.
-    model.card = {  # type: ignore[attr-defined]
+    card = {
         "scenario": config.scenario,
         "observe": config.observe,
         "labels": list(layout.labels),
     }
+    vars(model)["card"] = card
     env.seed(config.seed * 10_000)
     return model
 
