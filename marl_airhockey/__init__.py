@@ -14,6 +14,7 @@ from marl_airhockey.make import (  # noqa: E402
     make_world,
     parallel_env,
 )
+from marl_airhockey.registration import register_all  # noqa: E402
 from marl_airhockey.registry import (  # noqa: E402
     agent_names,
     backend_names,
@@ -21,6 +22,8 @@ from marl_airhockey.registry import (  # noqa: E402
     make_scenario,
     scenario_names,
 )
+
+register_all()
 
 __version__ = "0.1.0"
 __all__ = [

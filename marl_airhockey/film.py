@@ -10,6 +10,7 @@ import numpy as np
 from marl_airhockey.driver import Driver
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.render import Renderer, draw, write_video
+from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
 
 FINAL_HOLD = 0.7
@@ -17,7 +18,7 @@ FINAL_HOLD = 0.7
 
 
 def film(
-    scenario: str,
+    scenario: str | Scenario,
     driver: Driver,
     keywords: Keywords,
     seed: int = 0,
@@ -29,7 +30,7 @@ def film(
     """Play some episodes with ``driver`` at paddle_0 and show them.
 
     Args:
-        scenario: name of the scenario.
+        scenario: its name, or a scenario object.
         driver: who plays.
         keywords: of the environment.
         seed: of the first episode.
@@ -53,7 +54,7 @@ def film(
     seated: Keywords = {**keywords, "drivers": {"paddle_0": driver}}
     world = build_world(scenario, 1, autoreset=False, keywords=seated)
     mode = "human" if video is None else "rgb_array"
-    renderer = Renderer(world, mode, scenario.replace("_", " "))
+    renderer = Renderer(world, mode, world.scenario.name.replace("_", " "))
     fps = 1 / world.control_dt
     pictures: list[Array] = []
     for episode in range(episodes):

@@ -8,8 +8,10 @@ position is ever clipped.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from marl_airhockey.state import Array
 from marl_airhockey.table import Seat, Table, half_planes
@@ -50,9 +52,8 @@ class Reach:
         return Reach(normals, offsets, share, passes=1 if sharpest > -1e-9 else 12)
 
 
-@dataclass(frozen=True)
-class Excess:
-    """By how much the asked velocity went beyond each limit, (..., S), zero if not."""
+class Excess(NamedTuple):
+    """By how much the asked velocity went beyond each limit, (B, S), zero if not."""
 
     speed: Array
     """m/s"""
@@ -62,6 +63,8 @@ class Excess:
     """m/s3"""
     reach: Array
     """m/s taken off toward an edge of the reach"""
+    cost: Array
+    """All of them in units of their limits, summed"""
 
 
 def limits(
@@ -80,88 +83,139 @@ def limits(
     step by a linear ramp.
 
     Args:
-        asked: (..., S, 2) wanted velocity, m/s.
-        position: (..., S, 2) of the paddles, m.
-        velocity: (..., S, 2) of the paddles, m/s: what was sent last.
-        pushed: (..., S, 2) acceleration of the last step, m/s2.
+        asked: (B, S, 2) wanted velocity, m/s.
+        position: (B, S, 2) of the paddles, m.
+        velocity: (B, S, 2) of the paddles, m/s: what was sent last.
+        pushed: (B, S, 2) acceleration of the last step, m/s2.
         reach: the seats' reaches.
-        speed: (..., S) or (..., 1) top speed, m/s.
-        acceleration: (..., S) or (..., 1) largest change of velocity, m/s2.
+        speed: (B,) top speed, m/s.
+        acceleration: (B,) largest change of velocity, m/s2.
         dt: length of a control step, s.
 
     Returns:
-        The sent velocity (..., S, 2) and the excess of the asked one.
+        The sent velocity (B, S, 2) and the excess of the asked one.
 
     Raises:
         ValueError: an asked velocity that is not finite.
     """
-    norm = np.sqrt(np.einsum("...d,...d->...", asked, asked))
-    if not np.isfinite(norm).all():
-        raise ValueError("action: every element must be finite, got nan or inf")
-    target = asked * (speed / np.maximum(norm, speed))[..., None]
-    change = target - velocity
-    size = np.sqrt(np.einsum("...d,...d->...", change, change))
-    most = acceleration * dt
-    step = change * (most / np.maximum(size, most))[..., None]
-    wanted = velocity + step
-
-    # Toward edge k at most h: from the end of this step a full stop must still fit,
-    # h^2 / 2a + h dt / 2 for the stop in ramped steps plus (v + h) dt / 2 for this one.
-    planned = (acceleration * reach.share)[..., None]
-    distance = np.einsum("skd,...sd->...sk", reach.normals, position) + reach.offsets
-    closing = -np.einsum("skd,...sd->...sk", reach.normals, velocity)
-    room = np.maximum(distance - 0.5 * dt * closing, 0.0)
-    fastest = planned * (np.sqrt(dt * dt + 2.0 * room / planned) - dt)
-    sent = wanted
-    bent = (-np.einsum("skd,...sd->...sk", reach.normals, wanted) > fastest).any()
-    if bent:
-        # A planned stop never needs more than the planned deceleration.
-        fastest = np.maximum(fastest, closing - planned * dt)
-        sent = _inside(wanted, reach, fastest)
-        sent = _within(sent, velocity, most, reach, fastest)
-        cut = wanted - sent
-        lost = np.sqrt(np.einsum("...d,...d->...", cut, cut))
-    else:
-        lost = np.zeros_like(norm)
-    jump = change / dt - pushed
-    jolt = np.sqrt(np.einsum("...d,...d->...", jump, jump)) / dt
-    return sent, Excess(
-        speed=np.maximum(norm - speed * (1 + 1e-6), 0.0),
-        acceleration=np.maximum(size / dt - acceleration * (1 + 1e-6), 0.0),
-        jerk=np.maximum(jolt - JERK * acceleration, 0.0),
-        reach=lost,
+    sent = np.empty(asked.shape)
+    excess = np.empty((5, *asked.shape[:-1]))
+    finite = _filter(
+        asked,
+        position,
+        velocity,
+        pushed,
+        reach.normals,
+        reach.offsets,
+        reach.share,
+        reach.passes,
+        speed,
+        acceleration,
+        dt,
+        sent,
+        excess,
     )
+    if not finite:
+        raise ValueError("action: every element must be finite, got nan or inf")
+    return sent, Excess(*excess)
 
 
-def _inside(wanted: Array, reach: Reach, fastest: Array) -> Array:
-    """The wanted velocity with what goes too fast toward an edge taken off."""
-    sent = wanted
-    for _ in range(reach.passes):
-        for k in range(reach.normals.shape[1]):
-            normal = reach.normals[:, k]
-            over = -np.einsum("sd,...sd->...s", normal, sent) - fastest[..., k]
-            sent = sent + np.maximum(over, 0.0)[..., None] * normal
-    return sent
+@njit(cache=True)
+def _filter(
+    asked: Array,
+    position: Array,
+    velocity: Array,
+    pushed: Array,
+    normals: Array,
+    offsets: Array,
+    share: Array,
+    passes: int,
+    speed: Array,
+    acceleration: Array,
+    dt: float,
+    sent: Array,
+    excess: Array,
+) -> bool:
+    """`limits` for each seat of each world; False if an asked one is not finite."""
+    edges = normals.shape[1]
+    fastest = np.empty(edges)
+    for b in range(asked.shape[0]):
+        top, most = speed[b], acceleration[b] * dt
+        for s in range(asked.shape[1]):
+            ax, ay = asked[b, s, 0], asked[b, s, 1]
+            vx, vy = velocity[b, s, 0], velocity[b, s, 1]
+            norm = np.sqrt(ax * ax + ay * ay)
+            if not np.isfinite(norm):
+                return False
+            fit = top / max(norm, top)
+            dx, dy = ax * fit - vx, ay * fit - vy
+            change = np.sqrt(dx * dx + dy * dy)
+            fit = most / max(change, most)
+            wx, wy = vx + dx * fit, vy + dy * fit
+
+            # Toward edge k at most h: after this step a full stop must still fit.
+            # This step takes (v + h) dt / 2; the stop h^2 / 2a and, in ramped steps,
+            # up to h dt / 2 more. It never needs more than the planned deceleration.
+            planned = acceleration[b] * share[s]
+            for k in range(edges):
+                nx, ny = normals[s, k, 0], normals[s, k, 1]
+                closing = -(nx * vx + ny * vy)
+                px, py = position[b, s, 0], position[b, s, 1]
+                room = nx * px + ny * py + offsets[s, k] - 0.5 * dt * closing
+                h = planned * (np.sqrt(dt * dt + 2.0 * max(room, 0.0) / planned) - dt)
+                fastest[k] = max(h, closing - planned * dt)
+            sx, sy = _inside(wx, wy, normals[s], fastest, passes)
+            if (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
+                sx, sy = _within(sx, sy, vx, vy, most, normals[s], fastest, passes)
+            sent[b, s, 0], sent[b, s, 1] = sx, sy
+
+            jx = dx / dt - pushed[b, s, 0]
+            jy = dy / dt - pushed[b, s, 1]
+            jolt = np.sqrt(jx * jx + jy * jy) / dt
+            over = excess[:, b, s]
+            over[0] = max(norm - top * (1 + 1e-6), 0.0)
+            over[1] = max(change / dt - acceleration[b] * (1 + 1e-6), 0.0)
+            over[2] = max(jolt - JERK * acceleration[b], 0.0)
+            over[3] = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2)
+            over[4] = (over[0] + over[3]) / top
+            over[4] += (over[1] + over[2] / JERK) / acceleration[b]
+    return True
 
 
+@njit(cache=True)
+def _inside(
+    x: float, y: float, normals: Array, fastest: Array, passes: int
+) -> tuple[float, float]:
+    """A velocity with what goes too fast toward an edge taken off."""
+    for _ in range(passes):
+        for k in range(len(fastest)):
+            nx, ny = normals[k, 0], normals[k, 1]
+            over = -(nx * x + ny * y) - fastest[k]
+            if over > 0.0:
+                x, y = x + over * nx, y + over * ny
+    return x, y
+
+
+@njit(cache=True)
 def _within(
-    sent: Array, velocity: Array, most: Array, reach: Reach, fastest: Array
-) -> Array:
-    """``sent`` moved toward pure braking until its change of velocity is allowed.
+    sx: float,
+    sy: float,
+    vx: float,
+    vy: float,
+    most: float,
+    normals: Array,
+    fastest: Array,
+    passes: int,
+) -> tuple[float, float]:
+    """A sent velocity moved toward pure braking until its change is allowed.
 
     Both ends of the way lie inside the (convex) bounds of the edges, so all of it does.
     """
-    change = sent - velocity
-    size2 = np.einsum("...d,...d->...", change, change)
-    most2 = np.broadcast_to(most * most, size2.shape)
-    if not (size2 > most2).any():
-        return sent
-    braking = _inside(velocity, reach, fastest)
-    start = braking - velocity
-    way = sent - braking
-    a = np.maximum(np.einsum("...d,...d->...", way, way), 1e-18)
-    b = np.einsum("...d,...d->...", start, way)
-    c = np.einsum("...d,...d->...", start, start) - most2
-    share = (np.sqrt(np.maximum(b * b - a * c, 0.0)) - b) / a
-    share = np.where(size2 > most2, np.clip(share, 0.0, 1.0), 1.0)
-    return np.asarray(braking + share[..., None] * way)
+    bx, by = _inside(vx, vy, normals, fastest, passes)
+    wx, wy = sx - bx, sy - by
+    a = max(wx * wx + wy * wy, 1e-18)
+    b = (bx - vx) * wx + (by - vy) * wy
+    c = (bx - vx) ** 2 + (by - vy) ** 2 - most * most
+    share = (np.sqrt(max(b * b - a * c, 0.0)) - b) / a
+    share = min(max(share, 0.0), 1.0)
+    return bx + share * wx, by + share * wy

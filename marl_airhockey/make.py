@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 from marl_airhockey.driver import Driver
 from marl_airhockey.physics import Physics, Value, unknown
 from marl_airhockey.registry import find_backend, make_driver, make_scenario
+from marl_airhockey.scenario import Scenario
 from marl_airhockey.world import World
 
 if TYPE_CHECKING:
     from pettingzoo.utils.env import AECEnv
 
-    from marl_airhockey.env import AirHockeyEnv
+    from marl_airhockey.parallel import AirHockeyEnv
     from marl_airhockey.vector import AirHockeyVectorEnv
     from marl_airhockey.vector_sb3 import AirHockeyVecEnv
 
@@ -38,7 +39,7 @@ class Keywords(TypedDict, total=False):
 
 
 def build_world(
-    scenario: str,
+    scenario: str | Scenario,
     num_worlds: int,
     autoreset: bool,
     keywords: Keywords,
@@ -46,7 +47,7 @@ def build_world(
     """Build B worlds of a scenario from the keywords that all environments share.
 
     Args:
-        scenario: name of a file in ``scenarios/``.
+        scenario: name of a file in ``scenarios/``, or a scenario object.
         num_worlds: B.
         autoreset: whether worlds begin anew where an episode ended.
         keywords: all optional.
@@ -73,17 +74,13 @@ def build_world(
             raise ValueError(unknown("keyword", name, Keywords.__annotations__))
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
-    options = dict(keywords.get("options", {}))
-    for shared in ("seats", "goals"):
-        if shared in keywords:
-            options[shared] = keywords.get(shared)
-    game = make_scenario(scenario, **options)
+    game = _scenario(scenario, keywords)
     cast = game.cast
     name = keywords.get("backend", "pymunk")
     kind = find_backend(name)
     reason = kind.supports(cast)
     if reason:
-        raise ValueError(f"backend {name!r} cannot play {scenario!r}: {reason}")
+        raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
     control_dt = keywords.get("control_dt", 0.05)
     substeps = keywords.get("substeps", kind.default_substeps)
     max_cycles = keywords.get("max_cycles")
@@ -117,24 +114,40 @@ def build_world(
     )
 
 
+def _scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
+    options = dict(keywords.get("options", {}))
+    for shared in ("seats", "goals"):
+        if shared in keywords:
+            options[shared] = keywords.get(shared)
+    if isinstance(scenario, str):
+        return make_scenario(scenario, **options)
+    if options:
+        raise ValueError(f"options {sorted(options)}: give them to the scenario object")
+    return scenario
+
+
 def make_world(
-    scenario: str, num_worlds: int = 1, **keywords: Unpack[Keywords]
+    scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> World:
     """B worlds as arrays: ``reset(seed)`` and ``step(actions (B, open, 2))``."""
     return build_world(scenario, num_worlds, autoreset=True, keywords=keywords)
 
 
 def parallel_env(
-    scenario: str, render_mode: str | None = None, **keywords: Unpack[Keywords]
+    scenario: str | Scenario,
+    render_mode: str | None = None,
+    **keywords: Unpack[Keywords],
 ) -> AirHockeyEnv:
     """A PettingZoo ParallelEnv of a scenario; its open seats are the agents."""
-    from marl_airhockey.env import AirHockeyEnv
+    from marl_airhockey.parallel import AirHockeyEnv
 
     return AirHockeyEnv(scenario, render_mode, **keywords)
 
 
 def env(
-    scenario: str, render_mode: str | None = None, **keywords: Unpack[Keywords]
+    scenario: str | Scenario,
+    render_mode: str | None = None,
+    **keywords: Unpack[Keywords],
 ) -> AECEnv[str, Any, Any]:
     """The same as a PettingZoo AEC environment, with its usual wrappers."""
     from pettingzoo.utils.conversions import parallel_to_aec
@@ -146,7 +159,7 @@ def env(
 
 
 def make_vec(
-    scenario: str, num_envs: int = 1, **keywords: Unpack[Keywords]
+    scenario: str | Scenario, num_envs: int = 1, **keywords: Unpack[Keywords]
 ) -> AirHockeyVectorEnv:
     """A gymnasium VectorEnv of a scenario with one open seat."""
     from marl_airhockey.vector import AirHockeyVectorEnv
@@ -155,7 +168,7 @@ def make_vec(
 
 
 def make_sb3_vec(
-    scenario: str, num_worlds: int = 1, **keywords: Unpack[Keywords]
+    scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> AirHockeyVecEnv:
     """A stable-baselines3 VecEnv of num_worlds x open seats."""
     from marl_airhockey.extras import need

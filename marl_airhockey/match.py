@@ -11,6 +11,7 @@ import numpy as np
 
 from marl_airhockey.driver import Driver
 from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
 from marl_airhockey.world import World
 
@@ -96,7 +97,7 @@ def interval(share: float, n: int) -> tuple[float, float]:
 def evaluate(
     driver: Driver,
     name: str,
-    scenario: str,
+    scenario: str | Scenario,
     episodes: int = 200,
     seed: int = TEST_SEED,
     keywords: Keywords | None = None,
@@ -107,7 +108,7 @@ def evaluate(
     Args:
         driver: who plays.
         name: what to call it in the result.
-        scenario: name of the scenario.
+        scenario: its name, or a scenario object.
         episodes: how many; episode i is world i's first with seed + i.
         seed: of the first episode.
         keywords: of the environment, see `make.build_world`.
@@ -124,7 +125,7 @@ def evaluate(
     success = float(tally.success.mean())
     result = Result(
         driver=name,
-        scenario=scenario,
+        scenario=world.scenario.name,
         backend=keywords.get("backend", "pymunk"),
         profile=keywords.get("profile", "ideal"),
         episodes=episodes,

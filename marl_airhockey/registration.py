@@ -1,4 +1,9 @@
-"""Called by gymnasium when it is imported: register every scenario, import no more."""
+"""Tell gymnasium of every scenario, when this package is imported.
+
+Gymnasium has had no entry points for plugins since 1.0: an id is known after ``import
+marl_airhockey``, or with the module named before it,
+``marl_airhockey:marl_airhockey/Juggle-v0``.
+"""
 
 from __future__ import annotations
 

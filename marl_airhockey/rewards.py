@@ -46,10 +46,10 @@ def count_touches(memory: Memory, before: State, after: State) -> Memory:
     ``apart`` is the time in seconds since the last contact ended, 0 while in contact. A
     puck cradled against the paddle earns a single touch.
     """
-    began = after.touched > 0
     dt = (after.time - before.time)[..., None, None]
-    if not (began | before.touching | after.touching).any():
+    if not after.contact:
         return {"touches": memory["touches"], "apart": memory["apart"] + dt}
+    began = after.touched > 0
     at = np.where(began, after.touched_at, 0.0)
     distinct = began & (memory["apart"] + at >= TOUCH_GAP)
     apart = np.where(began, dt - at, memory["apart"] + dt)
@@ -103,6 +103,8 @@ def contact_height(before: State, after: State) -> Array:
     It is where the puck flew to until the contact began, and where it is now while the
     contact lasts; nan if there was none.
     """
+    if not after.contact:
+        return np.full(after.puck.shape[:-1], np.nan)
     at = np.where(after.touched > 0, after.touched_at, np.nan)
     last = np.fmax.reduce(at, axis=-2)
     met = before.puck[..., 0] + before.puck_velocity[..., 0] * last
@@ -165,7 +167,8 @@ def enters(
 def jitter(before: State, sent: Array, top_speed: Array | float) -> Array:
     """(..., seats) squared change of the sent velocity, in top speeds."""
     change = (sent - before.paddle_velocity) / top_speed
-    return np.asarray((change * change).sum(-1))
+    x, y = change[..., 0], change[..., 1]
+    return np.asarray(x * x + y * y)
 
 
 def turning(before: State, sent: Array) -> Array:

@@ -137,6 +137,11 @@ class Scenario(ABC):
 
     # What follows is shared by all scenarios and not meant to be replaced.
 
+    @property
+    def name(self) -> str:
+        """The name of the file that the scenario comes from."""
+        return type(self).__module__.rpartition(".")[2]
+
     @cached_property
     def table_geometry(self) -> Table:
         """The table that the option names."""

@@ -7,17 +7,18 @@ from typing import Any, Unpack
 import gymnasium
 import numpy as np
 
-from marl_airhockey.env import AirHockeyEnv
 from marl_airhockey.make import Keywords
-from marl_airhockey.scenario import GoalScenario
+from marl_airhockey.parallel import AirHockeyEnv
+from marl_airhockey.scenario import GoalScenario, Scenario
 from marl_airhockey.state import Array
+from marl_airhockey.world import World
 
 
 class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
     """A scenario as its only open seat sees it.
 
     Args:
-        scenario: name of the scenario.
+        scenario: its name, or a scenario object.
         render_mode: None, "rgb_array" or "human".
         **keywords: see `make.build_world`.
 
@@ -29,12 +30,12 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
 
     def __init__(
         self,
-        scenario: str,
+        scenario: str | Scenario,
         render_mode: str | None = None,
         **keywords: Unpack[Keywords],
     ) -> None:
         self.parallel = AirHockeyEnv(scenario, render_mode, **keywords)
-        check_one_open(scenario, self.parallel.possible_agents)
+        check_one_open(self.parallel.world)
         self.agent = self.parallel.possible_agents[0]
         self.render_mode = render_mode
         self.metadata = self.parallel.metadata
@@ -81,21 +82,25 @@ class AirHockeyGoalEnv(AirHockeySingleEnv):
         return np.asarray(scenario.goal_reward(achieved, desired), np.float32)
 
 
-def check_one_open(scenario: str, agents: list[str]) -> None:
-    """Refuse a scenario that does not leave exactly one seat open.
+def check_one_open(world: World) -> None:
+    """Refuse a world that does not leave exactly one seat open.
 
     Raises:
         ValueError: says what to do.
     """
-    if len(agents) != 1:
+    if len(world.open) != 1:
+        agents = [f"paddle_{i}" for i in world.open]
         raise ValueError(
-            f"{scenario!r} has open seats {agents}; a single-agent environment needs "
-            'exactly one: give the others drivers, e.g. drivers={"paddle_1": "still"}'
+            f"{world.scenario.name!r} has open seats {agents}; a single-agent "
+            "environment needs exactly one: give the others drivers, e.g. "
+            'drivers={"paddle_1": "still"}'
         )
 
 
 def make_single(
-    scenario: str, render_mode: str | None = None, **keywords: Unpack[Keywords]
+    scenario: str | Scenario,
+    render_mode: str | None = None,
+    **keywords: Unpack[Keywords],
 ) -> AirHockeySingleEnv:
     """What ``gymnasium.make`` calls."""
     dicts = keywords.get("goals") == "dict"

@@ -10,6 +10,7 @@ from gymnasium.vector.utils import batch_space
 
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.observer import Observation
+from marl_airhockey.scenario import Scenario
 from marl_airhockey.single import check_one_open
 from marl_airhockey.spaces import action_space, observation_space
 from marl_airhockey.state import Array
@@ -23,16 +24,16 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
     ``final_info`` hold its end, with the masks ``_final_obs`` and ``_final_info``.
 
     Args:
-        scenario: name of the scenario.
+        scenario: its name, or a scenario object.
         num_envs: B.
         **keywords: see `make.build_world`.
     """
 
     def __init__(
-        self, scenario: str, num_envs: int = 1, **keywords: Unpack[Keywords]
+        self, scenario: str | Scenario, num_envs: int = 1, **keywords: Unpack[Keywords]
     ) -> None:
         self.world = build_world(scenario, num_envs, autoreset=True, keywords=keywords)
-        check_one_open(scenario, [f"paddle_{i}" for i in self.world.open])
+        check_one_open(self.world)
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
         self.num_envs = num_envs
         self.render_mode = None

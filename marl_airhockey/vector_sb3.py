@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.observer import Observation
-from marl_airhockey.scenario import GoalScenario
+from marl_airhockey.scenario import GoalScenario, Scenario
 from marl_airhockey.spaces import action_space, observation_space
 from marl_airhockey.state import Array
 
@@ -23,13 +23,16 @@ class AirHockeyVecEnv(VecEnv):
     ``first_shot`` and ``episode``; all others share one empty dict.
 
     Args:
-        scenario: name of the scenario.
+        scenario: its name, or a scenario object.
         num_worlds: B.
         **keywords: see `make.build_world`.
     """
 
     def __init__(
-        self, scenario: str, num_worlds: int = 1, **keywords: Unpack[Keywords]
+        self,
+        scenario: str | Scenario,
+        num_worlds: int = 1,
+        **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, num_worlds, True, keywords)
         self.seats = len(self.world.open)

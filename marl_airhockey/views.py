@@ -58,10 +58,10 @@ class Scope:
         """(S, 2, 2) from the table frame to each seat's ego frame."""
         return np.array([self.cast.table.rotation(s.side) for s in self.cast.seats])
 
-    @property
-    def shown(self) -> int:
-        """Numbers shown of each puck."""
-        return 4 if self.observe == "velocity" else 3 * HISTORY
+    @cached_property
+    def straight(self) -> bool:
+        """True if there is one seat and its ego frame is the table frame."""
+        return len(self.rotations) == 1 and bool(self.rotations[0, 0, 0] == 1.0)
 
     def place(
         self, name: str, unit: tuple[float, float], x: float = 0.0
@@ -90,47 +90,30 @@ class Ego:
     """A sensed state and the scenario's memory, seen from every seat."""
 
     def __init__(self, state: State, memory: Memory, history: Array, scope: Scope):
-        self.state, self.memory = state, memory
+        self.state, self.memory, self.scope = state, memory, scope
         self.history = history
         """(..., HISTORY, pucks, 3) sensed positions and visibility, newest last"""
-        self.scope = scope
-        self._straight = scope.rotations.shape[0] == 1 and bool(
-            scope.rotations[0, 0, 0] == 1.0
-        )
+        self.own = self._own(state.paddle)
+        """(..., S, 2) each seat's own paddle, m"""
+        self.own_velocity = self._own(state.paddle_velocity)
+        """(..., S, 2) m/s"""
+        self.puck = self.turn(state.puck)
+        """(..., S, pucks, 2) m"""
+        self.puck_velocity = self.turn(state.puck_velocity)
+        """(..., S, pucks, 2) m/s"""
 
     def turn(self, vectors: Array) -> Array:
         """(..., n, 2) vectors of the table frame to (..., S, n, 2) in ego frames."""
         seats = vectors[..., None, :, :]
-        if self._straight:
+        if self.scope.straight:
             return seats
         return np.asarray(seats @ self.scope.rotations.swapaxes(-1, -2))
 
-    @cached_property
-    def own(self) -> Array:
-        """(..., S, 2) each seat's own paddle, m."""
-        return self._diagonal(self.turn(self.state.paddle))
-
-    @cached_property
-    def own_velocity(self) -> Array:
-        """(..., S, 2) m/s."""
-        return self._diagonal(self.turn(self.state.paddle_velocity))
-
-    @cached_property
-    def puck(self) -> Array:
-        """(..., S, pucks, 2) m."""
-        return self.turn(self.state.puck)
-
-    @cached_property
-    def puck_velocity(self) -> Array:
-        """(..., S, pucks, 2) m/s."""
-        return self.turn(self.state.puck_velocity)
-
-    @staticmethod
-    def _diagonal(vectors: Array) -> Array:
-        if vectors.shape[-2] == 1:
-            return vectors[..., 0, :]
+    def _own(self, vectors: Array) -> Array:
+        if self.scope.straight:
+            return vectors
         seats = np.arange(vectors.shape[-2])
-        return np.asarray(vectors[..., seats, seats, :])
+        return np.asarray(self.turn(vectors)[..., seats, seats, :])
 
 
 class Piece(ABC):
@@ -144,8 +127,8 @@ class Piece(ABC):
         """One column for each number."""
 
     @abstractmethod
-    def read(self, ego: Ego) -> Array:
-        """(..., S, columns) the numbers."""
+    def write(self, ego: Ego, out: Array) -> None:
+        """Put the numbers into ``out`` (..., S, columns)."""
 
 
 @dataclass(frozen=True)
@@ -158,8 +141,9 @@ class Own(Piece):
             "own", scope.top_speed, scope.top_speed
         )
 
-    def read(self, ego: Ego) -> Array:
-        return np.concatenate([ego.own, ego.own_velocity], -1)
+    def write(self, ego: Ego, out: Array) -> None:
+        out[..., :2] = ego.own
+        out[..., 2:] = ego.own_velocity
 
 
 @dataclass(frozen=True)
@@ -173,13 +157,13 @@ class Others(Piece):
             columns += scope.motion(f"other_{i}", scope.top_speed, scope.top_speed)
         return columns
 
-    def read(self, ego: Ego) -> Array:
+    def write(self, ego: Ego, out: Array) -> None:
         order = _others(ego.scope.cast)
         rows = np.arange(len(order))[:, None]
         place = ego.turn(ego.state.paddle)[..., rows, order, :]
         motion = ego.turn(ego.state.paddle_velocity)[..., rows, order, :]
         both = np.concatenate([place, motion], -1)
-        return both.reshape(*both.shape[:-2], -1)
+        out[...] = both.reshape(out.shape)
 
 
 def _others(cast: Cast) -> Array:
@@ -216,16 +200,18 @@ class Pucks(Piece):
                     columns.append(Column(f"puck_{i}[-{ago}].seen", 0.0, 1.0, 1.0))
         return columns
 
-    def read(self, ego: Ego) -> Array:
+    def write(self, ego: Ego, out: Array) -> None:
         if ego.scope.observe == "velocity":
-            both = np.concatenate([ego.puck, ego.puck_velocity], -1)
-            return both.reshape(*both.shape[:-2], -1)
+            for i in range(ego.scope.cast.pucks):
+                out[..., 4 * i : 4 * i + 2] = ego.puck[..., i, :]
+                out[..., 4 * i + 2 : 4 * i + 4] = ego.puck_velocity[..., i, :]
+            return
         lead = ego.history.shape[:-3]
         flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 3)
         place = ego.turn(flat[..., :2])
         seen = np.broadcast_to(flat[..., None, :, 2:], (*place.shape[:-1], 1))
         both = np.concatenate([place, seen], -1)
-        return both.reshape(*both.shape[:-2], -1)
+        out[...] = both.reshape(out.shape)
 
 
 @dataclass(frozen=True)
@@ -236,9 +222,8 @@ class PucksFromOwn(Piece):
         names = [f"own_to_puck_{i}" for i in range(scope.cast.pucks)]
         return [c for name in names for c in scope.gap(name, (0.25, 0.125))]
 
-    def read(self, ego: Ego) -> Array:
-        gap = ego.puck - ego.own[..., None, :]
-        return gap.reshape(*gap.shape[:-2], -1)
+    def write(self, ego: Ego, out: Array) -> None:
+        out[...] = (ego.puck - ego.own[..., None, :]).reshape(out.shape)
 
 
 @dataclass(frozen=True)
@@ -252,9 +237,8 @@ class Blocks(Piece):
         names = [f"block_{i}" for i in range(scope.cast.blocks)]
         return [c for name in names for c in scope.place(name, (0.3, 0.2), self.x)]
 
-    def read(self, ego: Ego) -> Array:
-        place = ego.turn(ego.state.block)
-        return place.reshape(*place.shape[:-2], -1)
+    def write(self, ego: Ego, out: Array) -> None:
+        out[...] = ego.turn(ego.state.block).reshape(out.shape)
 
 
 @dataclass(frozen=True)
@@ -265,9 +249,9 @@ class BlocksFromPuck(Piece):
         names = [f"puck_0_to_block_{i}" for i in range(scope.cast.blocks)]
         return [c for name in names for c in scope.gap(name, (1.0, 0.5))]
 
-    def read(self, ego: Ego) -> Array:
+    def write(self, ego: Ego, out: Array) -> None:
         gap = ego.turn(ego.state.block) - ego.puck[..., :1, :]
-        return gap.reshape(*gap.shape[:-2], -1)
+        out[...] = gap.reshape(out.shape)
 
 
 @dataclass(frozen=True)
@@ -277,10 +261,8 @@ class Touched(Piece):
     def columns(self, scope: Scope) -> list[Column]:
         return [Column("touched", 0.0, 1.0, 1.0)]
 
-    def read(self, ego: Ego) -> Array:
-        flag = touched(ego.memory)[..., None]
-        seats = len(ego.scope.cast.seats)
-        return np.broadcast_to(flag, (*flag.shape[:-1], seats))[..., None]
+    def write(self, ego: Ego, out: Array) -> None:
+        out[...] = touched(ego.memory)[..., None, None]
 
 
 @dataclass(frozen=True)
@@ -301,10 +283,10 @@ class Goal(Piece):
             f"{self.origin}_to_goal", self.unit
         )
 
-    def read(self, ego: Ego) -> Array:
+    def write(self, ego: Ego, out: Array) -> None:
         goal = ego.turn(ego.memory["goal"][..., None, :])[..., 0, :]
-        origin = ego.own if self.origin == "own" else ego.puck[..., 0, :]
-        return np.concatenate([goal, goal - origin], -1)
+        out[..., :2] = goal
+        out[..., 2:] = goal - (ego.own if self.origin == "own" else ego.puck[..., 0, :])
 
 
 @dataclass(frozen=True)
@@ -318,8 +300,8 @@ class GoalVelocity(Piece):
     def columns(self, scope: Scope) -> list[Column]:
         return scope.motion("goal", self.most, self.unit)
 
-    def read(self, ego: Ego) -> Array:
-        return ego.turn(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
+    def write(self, ego: Ego, out: Array) -> None:
+        out[...] = ego.turn(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
 
 
 @dataclass(frozen=True)
@@ -337,12 +319,9 @@ class Recall(Piece):
         names = [f"{self.name}_{i}" for i in range(scope.cast.pucks)]
         return [Column(name, self.low, self.high, self.unit) for name in names]
 
-    def read(self, ego: Ego) -> Array:
+    def write(self, ego: Ego, out: Array) -> None:
         value = ego.memory[self.name][..., None, :]
-        if self.from_own:
-            return np.asarray(value - ego.own[..., :1])
-        seats = len(ego.scope.cast.seats)
-        return np.broadcast_to(value, (*value.shape[:-2], seats, value.shape[-1]))
+        out[...] = value - ego.own[..., :1] if self.from_own else value
 
 
 class Layout:
@@ -372,6 +351,6 @@ class Layout:
         shape = (*ego.state.time.shape, seats, len(self.labels))
         out = np.empty(shape, np.float32)
         for piece, part in self._parts:
-            out[..., part] = piece.read(ego)
+            piece.write(ego, out[..., part])
         np.maximum(out, self.low, out=out)
         return np.minimum(out, self.high, out=out)

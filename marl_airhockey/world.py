@@ -102,6 +102,7 @@ class World:
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = Reach.of(cast.table, cast.seats)
         self._to_ego = np.array([cast.table.rotation(s.side) for s in cast.seats])
+        self._straight = bool((self._to_ego == np.eye(2)).all())
         self.sensor = Sensor(cast, b, physics, dt)
         self.observer = Observer(scenario, self.sensor, physics, observe)
         self.driven = [
@@ -160,12 +161,14 @@ class World:
         episode.number[mask] += 1
         for purpose, stream in self._streams.items():
             stream.renew(mask, self._seeds, episode.number, purpose)
-        drawn = self.physics.draw(self._streams["physics"].select(mask))
         if not episode.physics:
-            episode.physics = {k: np.zeros(self.num_worlds) for k in drawn}
-        for name, value in drawn.items():
-            episode.physics[name][mask] = value
-        self.backend.set_physics(episode.physics, mask)
+            episode.physics = self.physics.draw(self._streams["physics"])
+            self.backend.set_physics(episode.physics, np.ones_like(mask))
+        elif self.physics.varies:
+            drawn = self.physics.draw(self._streams["physics"].select(mask))
+            for name, value in drawn.items():
+                episode.physics[name][mask] = value
+            self.backend.set_physics(episode.physics, mask)
         rows, memory = self.scenario.start(self._streams["start"].select(mask), w)
         self._place(mask, rows, memory)
         for counter in (episode.cycles, episode.returns, episode.success):
@@ -217,18 +220,19 @@ class World:
         asked, told = self._ask(actions)
         if self._delay is not None:
             asked = self._delay.push(asked, values["action_delay"])
-        speed = values["paddle_speed"][:, None]
-        acceleration = values["paddle_acceleration"][:, None]
-        wanted = asked * speed[..., None]
+        speed = values["paddle_speed"]
         self.asked = asked
+        wanted = asked * speed[:, None, None]
+        if not self._straight:
+            wanted = (wanted[..., None, :] @ self._to_ego)[..., 0, :]
         sent, excess = limits(
-            (wanted[..., None, :] @ self._to_ego)[..., 0, :],
+            wanted,
             before.paddle,
             before.paddle_velocity,
             self._pushed,
             self.reach,
             speed,
-            acceleration,
+            values["paddle_acceleration"],
             self.control_dt,
         )
         self.sent = sent
@@ -297,10 +301,10 @@ class World:
         excess: Excess,
         speed: Array,
     ) -> Step:
-        acceleration = self.episode.physics["paddle_acceleration"][:, None]
-        cost = (excess.speed + excess.reach) / speed
-        cost += (excess.acceleration + excess.jerk / 40.0) / acceleration
-        fraction = (self._to_ego @ sent[..., None])[..., 0] / speed[..., None]
+        turned = sent
+        if not self._straight:
+            turned = (self._to_ego @ sent[..., None])[..., 0]
+        fraction = turned / speed[:, None, None]
         result = Step(
             observation={},
             reward=reward,
@@ -309,7 +313,7 @@ class World:
             terms=terms,
             sent=fraction.astype(np.float32),
             excess=excess,
-            cost=cost,
+            cost=excess.cost,
             success=self.episode.success,
             first_shot=self.episode.first_shot.copy(),
         )

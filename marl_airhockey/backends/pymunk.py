@@ -6,6 +6,8 @@ puck follows its parabola exactly; states report them at their own time.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -100,7 +102,7 @@ class Space:
     def _build_walls(self) -> None:
         """Boxes behind every side, with a gap and a sensor in it for a goal mouth."""
         cast, static = self.cast, self.space.static_body
-        self._lines: list[tuple[Array, float, Array, float]] = []
+        self._lines: list[tuple[float, ...]] = []
         self.walls: list[pymunk.Shape] = []
         for side in range(len(cast.table.vertices)):
             start, end = cast.table.ends(side)
@@ -123,7 +125,8 @@ class Space:
             line = float(cast.table.offsets[side]) - cast.table.puck_radius
             half = max([(m.width or 0.0) / 2 for m in gaps], default=0.0)
             middle = (start + end) / 2
-            self._lines.append((cast.table.normals[side], line, middle, half))
+            nx, ny = cast.table.normals[side].tolist()
+            self._lines.append((nx, ny, line, *middle.tolist(), half))
             for a, b in zip(cuts[::2], cuts[1::2], strict=True):
                 wall = self._box(static, a, b, out)
                 wall.collision_type = WALL
@@ -162,6 +165,7 @@ class Space:
         flat = np.frombuffer(self._buffer.float_buf(), dtype=np.float64)
         self.rows = flat.reshape(-1, 4)[: len(self.bodies)]
         self._raw = [body._body for body in self.bodies]
+        self._loose = [s._shape for body in self.bodies for s in body.shapes]
         self._space = self.space._space
 
     def read(self) -> Array:
@@ -221,13 +225,14 @@ class Space:
     def start(self, position: Array, velocity: Array, angle: Array) -> None:
         """Put every mover (movers, 2) at a place with a velocity; forget all contacts.
 
-        Bodies are added anew in their order, so that no contact of the last episode
-        lives on in Chipmunk's cache.
+        Shapes are added anew in their order, so that no contact of the last episode
+        lives on in Chipmunk's caches and the same start gives the same episode.
         """
-        space = self.space
-        shapes = [shape for body in self.bodies for shape in body.shapes]
-        space.remove(*shapes)
-        space.add(*shapes)
+        # Through the library, as pymunk's bookkeeping of what is added stays the same.
+        for shape in self._loose:
+            lib.cpSpaceRemoveShape(self._space, shape)
+        for shape in self._loose:
+            lib.cpSpaceAddShape(self._space, shape)
         pucks = self.cast.bodies.puck
         for i, body in enumerate(self.bodies):
             x, y = position[i].tolist()
@@ -236,9 +241,10 @@ class Space:
             body.velocity = (vx - self.kick * (pucks.start <= i < pucks.stop), vy)
             if i >= pucks.stop:
                 body.angle, body.angular_velocity = float(angle[i]), 0.0
-        space.reindex_shapes_for_body(space.static_body)
+            lib.cpSpaceReindexShapesForBody(self._space, body._body)
         self._out.clear()
         self.touching[:] = False
+        self._events = True
 
     def step(
         self,
@@ -247,8 +253,8 @@ class Space:
         goal: Array,
         told: Array,
         path: Array | None,
-    ) -> None:
-        """Move by ``control_dt``.
+    ) -> bool:
+        """Move by ``control_dt``; True if anything touched, crossed or is out.
 
         Args:
             position: (paddles, 2) now, m; changed in place.
@@ -283,14 +289,17 @@ class Space:
                 path[k + 1] = self.read()
         if alone:
             velocity[0] = goal[0]
+        return self._events
 
     def _begin(self) -> None:
-        self._events = bool(self.touching.any())
+        if not self._events:
+            return
         self.touched[:] = 0
         self.touched_at[:] = np.nan
         self.crossed[:] = False
         for k in self._out:
             self._park(k)
+        self._events = bool(self._out) or bool(self.touching.any())
 
     def _drive(
         self, position: Array, velocity: Array, ramp: Array, told: Array
@@ -322,12 +331,13 @@ class Space:
                 lib.cpBodySetVelocity(body, (vx * share - self.kick, vy * share))
             self._free(self.bodies[first + k])
 
-    def _wall(self, place: Array, depth: float) -> tuple[Array, float] | None:
+    def _wall(self, x: float, y: float, depth: float) -> tuple[float, ...] | None:
         """Normal and offset of a wall that a puck is deeper in than ``depth``, m."""
-        for normal, line, middle, half in self._lines:
-            aside = (place - middle) @ np.array([-normal[1], normal[0]])
-            if normal @ place + line < -depth and abs(aside) >= half:
-                return normal, line
+        for nx, ny, line, mx, my, half in self._lines:
+            if nx * x + ny * y + line < -depth:
+                aside = nx * (y - my) - ny * (x - mx)
+                if abs(aside) >= half:
+                    return nx, ny, line
         return None
 
     def _free(self, puck: pymunk.Body) -> None:
@@ -336,27 +346,29 @@ class Space:
         Neither wall nor paddle yields to the solver, which would push the puck into
         the wall; in a corner the paddle is left to ride over it.
         """
-        place = np.array(puck.position)
-        wall = self._wall(place, SQUEEZE)
+        x, y = puck.position
+        wall = self._wall(x, y, SQUEEZE)
         if wall is None:
             return
-        normal, place = wall[0], self._inside(place)
-        along = np.array([-normal[1], normal[0]])
+        nx, ny, _ = wall
+        x, y = self._inside(x, y)
         touch = self.cast.table.paddle_radius + self.cast.table.puck_radius
         for paddle in self.bodies[self.cast.bodies.paddle]:
-            gap = place - np.array(paddle.position)
-            if gap @ gap < touch**2:
-                way = np.sqrt(touch**2 - (gap @ normal) ** 2)
-                place = place + (np.copysign(way, gap @ along) - gap @ along) * along
-        place = self._inside(place)
-        puck.position = (float(place[0]), float(place[1]))
+            px, py = paddle.position
+            gap, aside = nx * (x - px) + ny * (y - py), nx * (y - py) - ny * (x - px)
+            if gap * gap + aside * aside < touch * touch:
+                shift = math.copysign(math.sqrt(touch**2 - gap**2), aside) - aside
+                x, y = x - shift * ny, y + shift * nx
+        puck.position = self._inside(x, y)
 
-    def _inside(self, place: Array) -> Array:
+    def _inside(self, x: float, y: float) -> tuple[float, float]:
         for _ in range(2):
-            wall = self._wall(place, 0.0)
+            wall = self._wall(x, y, 0.0)
             if wall is not None:
-                place = place - (wall[0] @ place + wall[1]) * wall[0]
-        return place
+                nx, ny, line = wall
+                into = nx * x + ny * y + line
+                x, y = x - into * nx, y - into * ny
+        return x, y
 
     def _park(self, puck: int) -> None:
         body = self._raw[self.cast.bodies.puck.start + puck]
@@ -390,6 +402,7 @@ class Pymunk(Backend):
         self._steps = np.zeros(num_worlds, np.int64)
         self._kicks = np.zeros((num_worlds, 1))
         self._never = np.zeros((num_worlds, len(cast.seats)), np.bool_)
+        self._quiet = still_state(cast.bodies, num_worlds, mouths)
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
 
     def set_physics(self, values: dict[str, Array], mask: Array) -> None:
@@ -406,44 +419,57 @@ class Pymunk(Backend):
         self._steps[mask] = np.round(state.time / self.control_dt).astype(np.int64)
 
     def step(self, command: Command) -> State:
-        old, cast, b = self.state, self.cast, self.num_worlds
-        bodies = cast.bodies
-        new = still_state(
-            bodies, b, len(cast.mouths), self.substeps if cast.path else 0
-        )
-        s = bodies.paddles
+        old, bodies, s = self.state, self.cast.bodies, len(self.cast.seats)
         position = old.position[:, :s].copy()
         velocity = old.velocity[:, :s].copy()
         goal, told, lifted = command.velocity, self._never, None
         if command.told is not None:
             goal, told, lifted = self._follow(position, command.told, goal)
-        rows = np.empty((b, bodies.movers, 4))
+        rows = np.empty((self.num_worlds, bodies.movers, 4))
+        path = None
+        if self.cast.path:
+            shape = (self.num_worlds, self.substeps + 1, bodies.movers, 4)
+            path = np.empty(shape)
+        eventful = []
         for i, space in enumerate(self.spaces):
-            path = None if new.path is None else new.path[i]
-            space.step(position[i], velocity[i], goal[i], told[i], path)
+            way = None if path is None else path[i]
+            if space.step(position[i], velocity[i], goal[i], told[i], way):
+                eventful.append(i)
             rows[i] = space.read()
-            new.touched[i], new.touched_at[i] = space.touched, space.touched_at
-            new.touching[i], new.crossed[i] = space.touching, space.crossed
-            if space.crossed.any():
-                new.crossed_velocity[i] = space.crossed_velocity
-            for k, place in space.out.items():
-                rows[i, bodies.puck.start + k] = (*place, -self._kicks[i, 0], 0.0)
-        new.position[:, : bodies.movers] = rows[..., :2]
-        new.velocity[:, : bodies.movers] = rows[..., 2:]
-        new.velocity[:, :s] = velocity
-        new.velocity[:, bodies.puck, 0] += self._kicks
-        if new.path is not None:
-            new.path[:, :, bodies.puck, 2] += self._kicks[:, None]
+        rows[:, :s, 2:] = velocity
+        rows[:, bodies.puck, 2] += self._kicks
+        if path is not None:
+            path[:, :, bodies.puck, 2] += self._kicks[:, None]
+        self._steps += 1
+        place, speed = rows[..., :2], rows[..., 2:]
         if len(bodies) > bodies.movers:
-            new.position[:, bodies.movers :] = old.position[:, bodies.movers :]
+            place = np.concatenate([place, old.position[:, bodies.movers :]], 1)
+            speed = np.concatenate([speed, old.velocity[:, bodies.movers :]], 1)
+        new = self._quiet.moved(
+            place, speed, self._steps * self.control_dt, path, bool(eventful)
+        )
+        if eventful:
+            new = self._with_events(new, eventful)
         if command.told is not None:
             self._land(new, command.told, lifted)
         if self._turns:
-            self._read_turns(new)
-        self._steps += 1
-        new.time[:] = self._steps * self.control_dt
+            new = self._with_turns(new)
         self.state = new
         return new
+
+    def _with_events(self, state: State, worlds: list[int]) -> State:
+        """The state with the contacts and crossings of some worlds."""
+        quiet, names = self._quiet, ("touched", "touched_at", "touching", "crossed")
+        arrays = {n: getattr(quiet, n).copy() for n in (*names, "crossed_velocity")}
+        puck = self.cast.bodies.puck.start
+        for i in worlds:
+            space = self.spaces[i]
+            for name, array in arrays.items():
+                array[i] = getattr(space, name)
+            for k, place in space.out.items():
+                state.position[i, puck + k] = place
+                state.velocity[i, puck + k] = 0.0
+        return replace(state, **arrays)
 
     def _follow(
         self, position: Array, told: Array, goal: Array
@@ -463,12 +489,13 @@ class Pymunk(Backend):
         for i, k in zip(*np.nonzero(lifted), strict=True):
             self.spaces[i].lift(int(k), False)
 
-    def _read_turns(self, new: State) -> None:
+    def _with_turns(self, state: State) -> State:
+        angle, spin = np.zeros((2, *state.time.shape, len(state.bodies)))
         first = self.cast.bodies.block.start
         for i, space in enumerate(self.spaces):
             for k, body in enumerate(space.bodies[first:], start=first):
-                new.angle[i, k] = body.angle
-                new.spin[i, k] = body.angular_velocity
+                angle[i, k], spin[i, k] = body.angle, body.angular_velocity
+        return replace(state, angle=angle, spin=spin)
 
 
 make = Pymunk

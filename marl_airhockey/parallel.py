@@ -9,6 +9,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.scenario import Scenario
 from marl_airhockey.spaces import (
     action_space,
     global_state,
@@ -36,7 +37,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     limits), ``touches`` and ``physics``.
 
     Args:
-        scenario: name of the scenario.
+        scenario: its name, or a scenario object.
         render_mode: None, "rgb_array" or "human".
         **keywords: see `make.build_world`.
     """
@@ -50,20 +51,21 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
 
     def __init__(
         self,
-        scenario: str,
+        scenario: str | Scenario,
         render_mode: str | None = None,
         **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, 1, autoreset=False, keywords=keywords)
         fps = round(1 / self.world.control_dt)
-        name = f"{scenario}_v{self.world.scenario.version}"
+        game = self.world.scenario
+        name = f"{game.name}_v{game.version}"
         self.metadata = {**type(self).metadata, "name": name, "render_fps": fps}
         self.render_mode = render_mode
         self._renderer = None
         if render_mode is not None:
             from marl_airhockey.render import Renderer
 
-            title = scenario.replace("_", " ")
+            title = game.name.replace("_", " ")
             self._renderer = Renderer(self.world, render_mode, title)
         self.possible_agents = [f"paddle_{i}" for i in self.world.open]
         self.agents: list[str] = []

@@ -1,0 +1,42 @@
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-all lint docs clean
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+help: ## Show what there is to make
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
+		while IFS='|' read -r name what; do printf '  make %-10s %s\n' "$$name" "$$what"; done
+
+setup: $(READY) ## Set up .venv with all that demo and tests need
+
+# torch comes first and by itself: pip then takes a CPU build where there is one.
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
+	$(PYTHON) -m venv --clear .venv
+	$(BIN)/pip install --quiet --upgrade pip
+	$(BIN)/pip install --quiet --constraint constraints.txt torch
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,dev]'
+	touch $@
+
+demo: setup ## Train a paddle to juggle and show it (three minutes)
+	$(BIN)/airhockey demo
+
+test: setup lint ## Run linters, types and the tests that are not slow
+	$(BIN)/pytest -m 'not slow'
+
+test-all: setup lint ## Run every test
+	$(BIN)/pytest
+
+lint: setup ## Check format, style, spelling and types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios agents scripts tests
+	$(BIN)/mypy
+
+docs: setup ## Build the documentation into site/
+	$(BIN)/mkdocs build --strict
+
+clean: ## Remove what was made, the environment included
+	rm -rf .venv .venv-* build dist site runs .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -1,0 +1,28 @@
+import os
+
+import pytest
+
+import marl_airhockey as ah
+
+os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
+
+
+def pytest_generate_tests(metafunc):
+    """Every test that asks for a scenario, backend or agent gets all there are."""
+    found = {
+        "scenario": ah.scenario_names,
+        "backend": ah.backend_names,
+        "agent": lambda: [n for n in ah.agent_names() if n != "policy"],
+        "goal_scenario": lambda: GOALS,
+    }
+    for name, names in found.items():
+        if name in metafunc.fixturenames:
+            metafunc.parametrize(name, names())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread():
+    import torch
+
+    torch.set_num_threads(1)

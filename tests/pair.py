@@ -1,0 +1,61 @@
+"""A two-seat game for the tests: shows what games need of the core.
+
+Seats face each other, a goal serves the puck again inside the episode.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey import rewards, starts, views
+from marl_airhockey.cast import Cast, Mouth
+from marl_airhockey.scenario import Scenario
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair(Scenario):
+    seats: str = "arcade"
+    seconds: float = 10.0
+    jitter_weight: float = 0.0
+
+    @cached_property
+    def cast(self):
+        seats = (self.seat(0, (2,), team=0), self.seat(2, (0,), team=1))
+        mouths = (Mouth("home", 0, 0.30), Mouth("far", 2, 0.30))
+        flat = {"tilt": 0.0}
+        return Cast(self.table_geometry, seats, pucks=1, mouths=mouths, physics=flat)
+
+    def serve(self, draws, worlds):
+        state = starts.first_state(self.cast, worlds)
+        state.position[:, 0], state.position[:, 1] = (-0.5, 0.0), (0.5, 0.0)
+        state.velocity[:, 2] = draws.uniform(-0.5, 0.5, 2)
+        return state
+
+    def start(self, draws, worlds):
+        memory = rewards.no_touches(worlds, 2, 1) | {"goals": np.zeros((worlds, 2))}
+        return self.serve(draws, worlds), memory
+
+    def remember(self, memory, before, sent, after):
+        scored = after.crossed[..., 0, ::-1]
+        return {"goals": memory["goals"] + scored}
+
+    observation = (views.Own(), views.Others(), views.Pucks(), views.PucksFromOwn())
+
+    def reward_terms(self, before, sent, after, old, new):
+        scored = new["goals"] - old["goals"]
+        return {"goal": scored - scored[..., ::-1]}
+
+    def restart(self, draws, after, memory):
+        mask = after.crossed[..., 0, :].any(-1)
+        if not mask.any():
+            return None
+        state = self.serve(draws.select(mask), int(mask.sum()))
+        state.time[:] = after.time[mask]
+        return mask, state, {k: v[mask] for k, v in memory.items()}
+
+    def success(self, after, memory):
+        return memory["goals"] >= 3
+
+
+make = Pair

@@ -1,0 +1,231 @@
+"""What every scenario owes, on every backend; found by folder, listed nowhere."""
+
+import subprocess
+import sys
+import types
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import (
+    api_test,
+    max_cycles_test,
+    parallel_api_test,
+    parallel_seed_test,
+    render_test,
+    seed_test,
+    state_test,
+)
+from pettingzoo.utils.conversions import parallel_to_aec
+from stable_baselines3.common.env_checker import check_env as check_env_sb3
+
+import marl_airhockey as ah
+from marl_airhockey.match import evaluate
+from marl_airhockey.registry import gymnasium_id
+
+FLOORS = {"still": 0.01, "random": 0.10, "sticky": 0.10}
+
+
+def rollout(world, steps, seed, policy_seed=0):
+    """Observations, rewards and dones of random actions, stacked."""
+    rng = np.random.default_rng(policy_seed)
+    seen = [world.reset(seed)]
+    rewards, dones = [], []
+    shape = (world.num_worlds, len(world.open), 2)
+    for _ in range(steps):
+        step = world.step(rng.uniform(-1, 1, shape))
+        seen.append(step.observation)
+        rewards.append(step.reward)
+        dones.append(step.terminated | step.truncated)
+    return np.array(seen), np.array(rewards), np.array(dones)
+
+
+def test_pettingzoo_parallel_api(scenario, backend):
+    parallel_api_test(ah.parallel_env(scenario, backend=backend), num_cycles=400)
+
+
+def test_pettingzoo_aec_api(scenario, backend):
+    env = parallel_to_aec(ah.parallel_env(scenario, backend=backend))
+    api_test(env, num_cycles=200, verbose_progress=False)
+
+
+def test_pettingzoo_seeds(scenario, backend):
+    parallel_seed_test(lambda: ah.parallel_env(scenario, backend=backend), 60)
+    seed_test(lambda: ah.env(scenario, backend=backend), num_cycles=30)
+
+
+def test_pettingzoo_max_cycles(scenario, backend):
+    module = types.SimpleNamespace(
+        env=lambda max_cycles: ah.env(scenario, backend=backend, max_cycles=max_cycles),
+        parallel_env=lambda max_cycles: ah.parallel_env(
+            scenario, backend=backend, max_cycles=max_cycles
+        ),
+    )
+    max_cycles_test(module)
+
+
+def test_pettingzoo_render_and_state(scenario, backend):
+    render_test(
+        lambda render_mode=None: parallel_to_aec(
+            ah.parallel_env(scenario, render_mode, backend=backend)
+        )
+    )
+    parallel = ah.parallel_env(scenario, backend=backend)
+    state_test(parallel_to_aec(parallel), parallel)
+
+
+def test_gymnasium_and_sb3_checks(scenario, backend):
+    env = gymnasium.make(
+        f"marl_airhockey:{gymnasium_id(scenario)}",
+        backend=backend,
+        render_mode="rgb_array",
+    )
+    check_env(env.unwrapped)
+    check_env_sb3(env.unwrapped)
+    env.close()
+
+
+def test_the_same_seed_gives_the_same_episodes_in_another_process(scenario, backend):
+    program = (
+        "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
+        "import marl_airhockey as ah\n"
+        "from test_every_scenario import rollout\n"
+        "w = ah.make_world(sys.argv[2], 3, backend=sys.argv[3])\n"
+        "parts = rollout(w, 150, 7)\n"
+        "print(hashlib.sha256(b''.join(p.tobytes() for p in parts)).hexdigest())\n"
+    )
+    here = __file__.rpartition("/")[0]
+    command = [sys.executable, "-c", program, here, scenario, backend]
+    runs = [
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert runs[0] == runs[1]
+    assert len(runs[0].strip()) == 64
+
+
+def test_a_reset_with_the_same_seed_forgets_what_was_played(scenario, backend):
+    world = ah.make_world(scenario, 2, backend=backend)
+    first = rollout(world, 120, 3, policy_seed=1)
+    rollout(world, 77, 9, policy_seed=2)
+    again = rollout(world, 120, 3, policy_seed=1)
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_row_of_many_worlds_equals_a_single_world(scenario, backend):
+    many = ah.make_world(scenario, 8, backend=backend)
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (130, 8, len(many.open), 2))
+    seen = [many.reset(20)] + [many.step(a).observation for a in actions]
+    for row in (0, 5):
+        one = ah.make_world(scenario, 1, backend=backend)
+        single = [one.reset(20 + row)]
+        single += [one.step(a[row : row + 1]).observation for a in actions]
+        for a, b in zip(seen, single, strict=True):
+            np.testing.assert_array_equal(a[row], b[0])
+
+
+@pytest.mark.parametrize("profile", ["ideal", "robot"])
+def test_observations_lie_in_their_space_and_none_is_constant(
+    scenario, backend, profile
+):
+    env = ah.make_vec(scenario, 32, backend=backend, profile=profile)
+    seen, _ = env.reset(seed=0)
+    rows = [seen]
+    for _ in range(160):
+        # Chasing the puck, where there is one, shows what only contacts change.
+        action = env.action_space.sample()
+        labels = env.world.observer.layout.labels
+        if "own_to_puck_0.dx" in labels:
+            chase = 8 * rows[-1][:, labels.index("own_to_puck_0.dx") :][:, :2]
+            action[::2] = np.clip(chase[::2], -1, 1)
+        rows.append(env.step(action)[0])
+        assert env.observation_space.contains(rows[-1])
+    spread = np.ptp(np.concatenate(rows), axis=0)
+    labels = env.world.observer.layout.labels
+    dull = [label for label, s in zip(labels, spread, strict=True) if s == 0]
+    assert not dull
+
+
+def test_observations_share_no_memory_and_starts_vary(scenario, backend):
+    world = ah.make_world(scenario, 4, backend=backend)
+    first = world.reset(0)
+    kept = first.copy()
+    assert len(np.unique(first.reshape(4, -1), axis=0)) == 4
+    second = world.step(np.ones((4, len(world.open), 2))).observation
+    np.testing.assert_array_equal(first, kept)
+    assert not np.shares_memory(first, second)
+
+
+def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
+    worlds, steps = 6, 60
+    world = ah.make_world(scenario, worlds, backend=backend, max_cycles=10_000)
+    world.autoreset = False
+    world.reset(4)
+    game, start = world.scenario, world.memory
+    states, sent, rewards = [world.state], [], []
+    rng = np.random.default_rng(1)
+    for _ in range(steps):
+        step = world.step(rng.uniform(-1, 1, (worlds, len(world.open), 2)))
+        states.append(world.state)
+        sent.append(world.sent)
+        rewards.append(step.reward)
+
+    def stack(name):
+        return np.stack([getattr(s, name) for s in states])
+
+    paths = [s.path for s in states if s.path is not None]
+    names = ("position", "velocity", "angle", "spin", "touched", "touched_at")
+    names += ("touching", "crossed", "crossed_velocity", "visible", "time")
+    path = np.stack([paths[0], *paths]) if paths else None
+    recording = type(states[1])(
+        game.cast.bodies, *(stack(name) for name in names), path=path
+    )
+    sent = np.stack(sent)
+    memory = game.scan(start, recording, sent)
+    before, after = (
+        recording.map(lambda x, s=s: x[s]) for s in (slice(None, -1), slice(1, None))
+    )
+    old = {k: v[:-1] for k, v in memory.items()}
+    new = {k: v[1:] for k, v in memory.items()}
+    terms = game.judge(before, sent, after, old, new)
+    np.testing.assert_allclose(sum(terms.values()), rewards, atol=1e-12)
+    for name, value in world.memory.items():
+        np.testing.assert_array_equal(memory[name][-1], value)
+
+
+def test_rewards_are_the_sum_of_their_terms(scenario, backend):
+    env = ah.parallel_env(scenario, backend=backend)
+    env.reset(seed=2)
+    for _ in range(20):
+        _, reward, _, _, info = env.step(
+            {a: np.ones(2, np.float32) for a in env.agents}
+        )
+        for agent, value in reward.items():
+            assert value == pytest.approx(sum(info[agent]["reward"].values()))
+        if not env.agents:
+            break
+
+
+@pytest.mark.parametrize("driver", list(FLOORS))
+def test_luck_does_not_succeed(scenario, backend, driver):
+    keywords = {"backend": backend}
+    result = evaluate(ah.make_agent(driver), driver, scenario, 400, 0, keywords)
+    if scenario == "touch":
+        # A falling puck meets a still paddle one time in four.
+        assert 0.15 < result.success < 0.40
+    else:
+        # Three standard deviations of 400 episodes above the rule.
+        bar = FLOORS[driver]
+        assert result.success <= bar + 3 * np.sqrt(bar * (1 - bar) / 400)
+
+
+def test_options_reach_the_scenario(scenario, backend):
+    for seats in ("robot", "arcade"):
+        env = ah.parallel_env(scenario, backend=backend, seats=seats)
+        env.reset(seed=0)
+        assert env.world.cast.seats[0].speed == {"robot": 0.7, "arcade": 2.5}[seats]
+    short = ah.parallel_env(scenario, backend=backend, options={"seconds": 0.5})
+    assert short.max_cycles == 10

@@ -1,0 +1,27 @@
+"""Run by CI with the bare wheel, from outside the repository: nothing of it is near."""
+
+import contextlib
+import sys
+
+import gymnasium
+import numpy as np
+
+import marl_airhockey as ah
+
+assert "site-packages" in ah.__file__, ah.__file__
+assert len(ah.scenario_names()) >= 10
+for name in ah.scenario_names():
+    env = ah.parallel_env(name, render_mode="rgb_array")
+    env.reset(seed=0)
+    env.step({agent: np.zeros(2, np.float32) for agent in env.agents})
+    assert env.render().ndim == 3
+    env.close()
+env = gymnasium.make("marl_airhockey/Juggle-v0")
+assert env.reset(seed=0)[0].shape == env.observation_space.shape
+for driver in ah.agent_names():
+    if driver != "policy":
+        ah.make_agent(driver)
+with contextlib.suppress(RuntimeError):
+    ah.make_sb3_vec("juggle")
+    sys.exit("the bare wheel has no stable-baselines3, and must say so")
+print("the wheel works")
