@@ -7,6 +7,7 @@ if not (_here / "scenarios").is_dir():
     # In a checkout scenarios/ and agents/ lie beside this package; in a wheel, in it.
     __path__.append(str(_here.parent))
 
+from marl_airhockey.learn.policy import load_policy  # noqa: E402
 from marl_airhockey.make import (  # noqa: E402
     env,
     make_sb3_vec,
@@ -30,6 +31,7 @@ __all__ = [
     "agent_names",
     "backend_names",
     "env",
+    "load_policy",
     "make_agent",
     "make_sb3_vec",
     "make_scenario",

@@ -105,11 +105,11 @@ class Sensor:
             late = values["observation_delay"][mask] + self.control_dt
             self._place[mask] = position - velocity * late[:, None, None]
             self._visible[mask] = True
+        sensed = self.sense(state, values, draws, mask)
         if self.keeps_history:
-            self.history[mask, :, :, :2] = position[:, None, : self.pucks]
-            self.history[mask, :, :, 2] = 1.0
-            self.frames[mask] = state.position[mask][:, None]
-        return self.sense(state, values, draws, mask)
+            self.history[mask] = self.history[mask][:, -1:]
+            self.frames[mask] = self.frames[mask][:, -1:]
+        return sensed
 
     def sense(
         self,

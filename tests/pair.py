@@ -52,6 +52,9 @@ class Pair(Scenario):
             return None
         state = self.serve(draws.select(mask), int(mask.sum()))
         state.time[:] = after.time[mask]
+        # Paddles play on where they are.
+        state.paddle[:] = after.paddle[mask]
+        state.paddle_velocity[:] = after.paddle_velocity[mask]
         return mask, state, {k: v[mask] for k, v in memory.items()}
 
     def success(self, after, memory):

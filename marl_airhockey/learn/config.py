@@ -70,6 +70,13 @@ class TrainConfig:
         if not self.hidden or any(w < 1 for w in self.hidden):
             raise ValueError(f"hidden: {self.hidden} must be widths above 0")
 
+        rollout = self.n_steps * self.num_worlds
+        if rollout % self.batch_size:
+            raise ValueError(
+                f"batch_size: {self.batch_size} must divide n_steps x num_worlds, "
+                f"{rollout}"
+            )
+
     @property
     def keywords(self) -> dict[str, Any]:
         """The keywords of the environments."""

@@ -21,7 +21,11 @@ from typing import Any
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import (
+    CSVOutputFormat,
+    Logger,
+    TensorBoardOutputFormat,
+)
 
 from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.network import FixedScale
@@ -219,8 +223,6 @@ def train(
     Raises:
         ValueError: a folder that holds another run, or no run to resume.
     """
-    torch.set_num_threads((config or load_config(folder / "config.toml")).torch_threads)
-    torch.set_flush_denormal(True)
     resumed = config is None
     if config is None:
         config = load_config(folder / "config.toml")
@@ -233,25 +235,41 @@ def train(
         (folder / "config.toml").write_text(config.to_toml())
         (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
         progress = Progress()
+    left = config.total_steps - progress.steps
+    if left <= 0:
+        return _last_row(folder)
+    torch.set_num_threads(config.torch_threads)
+    torch.set_flush_denormal(True)
     rate = Rate(config, progress.rate or config.learning_rate)
     env = make_sb3_vec(config.scenario, config.num_worlds, **config.keywords)
-    env.seed(config.seed * 10_000 + progress.steps % 10_000)
     if resumed and (folder / "last.zip").exists():
         model = PPO.load(folder / "last.zip", env, device="cpu")
         model.learning_rate = model.lr_schedule = rate
     else:
         model = build(config, env, rate)
-    model.set_logger(configure(str(folder), ["csv", "tensorboard"]))
+    # Other worlds than those before the cut.
+    env.seed(config.seed * 10_000 + progress.steps % 9973)
+    model.set_logger(_logger(folder, progress.steps))
     keeper = Keeper(config, folder, progress, rate, report)
-    left = config.total_steps - progress.steps
-    if left > 0:
-        model.learn(left, callback=keeper, reset_num_timesteps=not resumed)
-    else:
-        keeper.init_callback(model)
+    model.learn(left, callback=keeper, reset_num_timesteps=progress.steps == 0)
     row = keeper.checkpoint()
     model.logger.dump(progress.steps)
+    model.logger.close()
     env.close()
     return row
+
+
+def _logger(folder: Path, steps: int) -> Logger:
+    """CSV and tensorboard; a resumed run begins another CSV, none is overwritten."""
+    name = f"progress-{steps}.csv" if steps else "progress.csv"
+    table = CSVOutputFormat(str(folder / name))
+    return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
+
+
+def _last_row(folder: Path) -> dict[str, float]:
+    with (folder / "evaluations.csv").open() as file:
+        *_, last = csv.DictReader(file)
+    return {name: float(value) for name, value in last.items()}
 
 
 def build(config: TrainConfig, env: AirHockeyVecEnv, rate: Rate) -> PPO:
@@ -298,7 +316,6 @@ def build(config: TrainConfig, env: AirHockeyVecEnv, rate: Rate) -> PPO:
         "labels": list(layout.labels),
     }
     vars(model)["card"] = card
-    env.seed(config.seed * 10_000)
     return model
 
 

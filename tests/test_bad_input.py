@@ -1,0 +1,158 @@
+"""Every mistake gets one clear error that names it; a reset makes the env usable."""
+
+import numpy as np
+import pytest
+
+import marl_airhockey as ah
+from marl_airhockey.cast import Cast
+from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.table import TABLES, Table, make_seat
+
+CORNERS = TABLES["standard"].vertices
+GOOD = {"paddle_0": np.zeros(2, np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (
+            lambda: ah.parallel_env("jugle"),
+            "unknown scenario 'jugle'; there are: juggle,",
+        ),
+        (lambda: ah.parallel_env("juggle", backend="pymonk"), "there are: pymunk"),
+        (
+            lambda: ah.parallel_env("juggle", drivers={"paddle_0": "strker"}),
+            "unknown driver 'strker'; there are: striker",
+        ),
+        (
+            lambda: ah.parallel_env("juggle", drivers={"paddle_7": "still"}),
+            "'paddle_7'",
+        ),
+        (lambda: ah.parallel_env("juggle", options={"lifft": 1}), "there are: lift"),
+        (lambda: ah.parallel_env("juggle", observ="velocity"), "there are: observe"),
+        (lambda: ah.parallel_env("juggle", observe="speed"), "unknown observe 'speed'"),
+        (lambda: ah.parallel_env("juggle", profile="real"), "unknown profile 'real'"),
+        (lambda: ah.parallel_env("juggle", seats="arcad"), "there are: arcade"),
+        (lambda: ah.parallel_env("juggle", options={"table": "big"}), "unknown table"),
+        (lambda: ah.parallel_env("juggle", render_mode="ansi"), "render_mode 'ansi'"),
+        (lambda: ah.parallel_env("juggle", physics={"tlt": 1.0}), "there are: tilt"),
+        (lambda: ah.parallel_env("juggle", physics={"tilt": -1.0}), "'tilt'"),
+        (lambda: ah.parallel_env("juggle", physics={"tilt": (5.0, 2.0)}), "'tilt'"),
+        (lambda: ah.parallel_env("juggle", physics={"tilt": "steep"}), "'tilt'"),
+        (lambda: ah.parallel_env("juggle", physics={"tilt": np.nan}), "'tilt'"),
+        (lambda: ah.parallel_env("juggle", control_dt=0.0), "control_dt"),
+        (lambda: ah.parallel_env("juggle", substeps=2.5), "substeps"),
+        (lambda: ah.parallel_env("juggle", max_cycles=0), "max_cycles"),
+        (lambda: ah.parallel_env("juggle", options={"seconds": -1.0}), "seconds"),
+        (lambda: ah.make_vec("juggle", 0), "num_worlds"),
+        (lambda: Table.rectangle(-1.0, 0.6), "vertices"),
+        (lambda: Table(CORNERS, puck_radius=0.4), "puck_radius"),
+        (
+            lambda: Table(CORNERS, paddle_radius=-0.1),
+            "paddle_radius",
+        ),
+        (lambda: Cast(TABLES["standard"], ()), "seats"),
+        (
+            lambda: Cast(
+                TABLES["standard"],
+                (make_seat("robot", TABLES["standard"], 0),),
+                blocks=1,
+                block_radius=0.9,
+            ),
+            "block_radius",
+        ),
+        (lambda: ah.load_policy("nowhere.zip"), "no such policy"),
+    ],
+)
+def test_it_is_refused_when_built(build, words):
+    with pytest.raises(ValueError, match=words.replace("(", r"\(")):
+        build()
+
+
+@pytest.mark.parametrize("name", list(PARAMETERS))
+def test_every_parameter_takes_a_value_and_a_range(name):
+    parameter = PARAMETERS[name]
+    value = min(max(parameter.default, parameter.low), parameter.high)
+    env = ah.parallel_env("touch", physics={name: value})
+    _, info = env.reset(seed=0)
+    assert info["paddle_0"]["physics"][name] == pytest.approx(value)
+    high = min(value + 0.01 * (parameter.high - parameter.low), parameter.high)
+    env = ah.parallel_env("touch", physics={name: (value, high)})
+    _, info = env.reset(seed=0)
+    assert value <= info["paddle_0"]["physics"][name] <= high
+    env.step(GOOD)
+
+
+@pytest.mark.parametrize(
+    ("actions", "words"),
+    [
+        ({}, "missing agents .*paddle_0"),
+        ({**GOOD, "paddle_1": np.zeros(2)}, "extra .*paddle_1"),
+        ({"paddle_0": np.zeros(3)}, "paddle_0.*shape"),
+        ({"paddle_0": "fast"}, "paddle_0"),
+        ({"paddle_0": np.array([True, False])}, "dtype bool"),
+        ({"paddle_0": np.array([np.nan, 0.0])}, "finite"),
+        ({"paddle_0": np.array([np.inf, 0.0])}, "finite"),
+    ],
+)
+def test_a_bad_action_is_named_and_the_env_goes_on(actions, words):
+    env = ah.parallel_env("juggle")
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=words):
+        env.step(actions)
+    env.reset(seed=0)
+    for _ in range(3):
+        seen, *_ = env.step(GOOD)
+    fresh = ah.parallel_env("juggle")
+    fresh.reset(seed=0)
+    for _ in range(3):
+        other, *_ = fresh.step(GOOD)
+    np.testing.assert_array_equal(seen["paddle_0"], other["paddle_0"])
+
+
+def test_stepping_before_a_reset_and_after_the_end():
+    env = ah.parallel_env("reach", max_cycles=2)
+    with pytest.raises(RuntimeError, match="reset"):
+        env.step(GOOD)
+    env.reset(seed=0)
+    env.step(GOOD)
+    _, _, _, truncated, _ = env.step(GOOD)
+    assert truncated["paddle_0"]
+    with pytest.raises(RuntimeError, match="reset"):
+        env.step(GOOD)
+    env.reset()
+    env.step(GOOD)
+    with pytest.raises(RuntimeError, match="render_mode"):
+        env.render()
+
+
+def test_a_world_wants_its_shape():
+    world = ah.make_world("reach", 3)
+    world.reset(0)
+    with pytest.raises(ValueError, match=r"\(3, 1, 2\)"):
+        world.step(np.zeros((3, 2)))
+
+
+def test_a_corrupt_or_foreign_policy_says_what_was_expected(tmp_path):
+    for name, words in (
+        ("a.zip", "not a stable-baselines3 policy"),
+        ("a.onnx", "not an ONNX model"),
+        ("a.txt", "expected a run folder"),
+    ):
+        path = tmp_path / name
+        path.write_text("nothing of the kind")
+        with pytest.raises(ValueError, match=words):
+            ah.load_policy(path)
+
+
+def test_a_missing_extra_is_one_line(monkeypatch):
+    import importlib.util
+
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util,
+        "find_spec",
+        lambda name, *a: None if name == "stable_baselines3" else find(name, *a),
+    )
+    with pytest.raises(RuntimeError, match=r"pip install 'marl_airhockey\[train\]'"):
+        ah.make_sb3_vec("juggle")

@@ -1,0 +1,111 @@
+"""What every driver owes, in every scenario it can play."""
+
+import numpy as np
+import pytest
+from pair import Pair
+
+import marl_airhockey as ah
+from marl_airhockey.match import evaluate
+
+
+def play(scenario, agent, worlds, steps, seed, **keywords):
+    drivers = {"paddle_0": agent}
+    world = ah.make_world(scenario, worlds, drivers=drivers, **keywords)
+    world.reset(seed)
+    sent = []
+    for _ in range(steps):
+        world.step(np.zeros((worlds, len(world.open), 2)))
+        sent.append(world.sent)
+    return np.array(sent)
+
+
+def test_it_plays_every_scenario_finitely_and_repeatably(agent, scenario):
+    goals = {"reach", "reach_velocity", "hit_goal", "hit_goal_velocity"}
+    if agent == "reacher" and scenario not in goals:
+        with pytest.raises(ValueError, match="no goal"):
+            play(scenario, agent, 2, 1, 0)
+        return
+    first = play(scenario, agent, 5, 60, 3)
+    assert np.isfinite(first).all()
+    np.testing.assert_array_equal(first, play(scenario, agent, 5, 60, 3))
+    np.testing.assert_array_equal(first[:, 2:3], play(scenario, agent, 1, 60, 5))
+
+
+def test_it_plays_both_ends_alike(agent):
+    """Ego frames: a driver mirrored to the far end does the mirrored thing."""
+    if agent == "reacher":
+        pytest.skip("needs a goal")
+    worlds = {}
+    for me, other in ((0, 1), (1, 0)):
+        drivers = {f"paddle_{me}": agent, f"paddle_{other}": "still"}
+        worlds[me] = ah.make_world(Pair(), 3, drivers=drivers)
+        worlds[me].reset(1)
+    near, far = worlds[0], worlds[1]
+    # Turn the far world's start by half a turn; seats then swap.
+    flipped = near.state.map(np.copy)
+    for name in ("position", "velocity"):
+        turned = -getattr(near.state, name)
+        getattr(flipped, name)[:] = turned[:, [1, 0, 2]]
+    everywhere = np.ones(3, bool)
+    far._place(everywhere, flipped, far.memory)
+    far._sensed = far._look(everywhere)
+    for world, seat in ((near, 0), (far, 1)):
+        world.driven[seat]._draws.renew(everywhere, near._seeds, near._seeds, "same")
+    for _ in range(40):
+        near.step(np.zeros((3, 0, 2)))
+        far.step(np.zeros((3, 0, 2)))
+        if near.memory["goals"].any():
+            break  # The serve after a goal is drawn by each for itself.
+        np.testing.assert_allclose(near.sent[:, 0], -far.sent[:, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("task", "script", "bar"),
+    [
+        ("reach", "reacher", 0.97),
+        ("reach_velocity", "reacher", 0.95),
+        ("touch", "goalkeeper", 0.95),
+        ("strike", "striker", 0.95),
+        ("juggle", "striker", 0.85),
+        ("puck_velocity", "striker", 0.95),
+        ("hit_goal", "striker", 0.90),
+        ("move_block", "striker", 0.90),
+    ],
+)
+def test_a_script_is_an_honest_baseline(task, script, bar):
+    result = evaluate(ah.make_agent(script), script, task, 200)
+    assert result.success >= bar
+    low, high = result.success_interval
+    assert low <= result.success <= high
+
+
+def test_a_driver_keeps_its_own_pace():
+    driver = ah.make_agent("random")
+    driver.control_dt = 0.15
+    world = ah.make_world("reach", 2, drivers={"paddle_0": driver})
+    world.reset(0)
+    asked = []
+    for _ in range(9):
+        world.step(np.zeros((2, 0, 2)))
+        asked.append(world.asked[:, 0].copy())
+    for k in range(0, 9, 3):
+        np.testing.assert_array_equal(asked[k], asked[k + 2])
+    assert not np.array_equal(asked[0], asked[3])
+    driver.control_dt = 0.07
+    with pytest.raises(ValueError, match="multiple"):
+        ah.make_world("reach", 2, drivers={"paddle_0": driver})
+
+
+def test_a_told_paddle_follows_its_driver():
+    class Hand(type(ah.make_agent("still"))):
+        def measured(self):
+            return np.array([[-0.5, 0.1, 0.2, 0.0]])
+
+    world = ah.make_world(Pair(), 1, drivers={"paddle_1": Hand()})
+    world.reset(0)
+    world.step(np.zeros((1, 1, 2)))
+    # Told in the ego frame of the far seat: half a turn from the table's.
+    np.testing.assert_allclose(world.state.paddle[0, 1], [0.5, -0.1], atol=1e-12)
+    np.testing.assert_allclose(
+        world.state.paddle_velocity[0, 1], [-0.2, 0.0], atol=1e-12
+    )

@@ -1,0 +1,335 @@
+"""Physics that every 2D backend owes: closed forms, and what must never happen."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pair import Pair
+
+import marl_airhockey as ah
+from marl_airhockey.backend import Command
+from marl_airhockey.cast import Cast, Mouth, Obstacle
+from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
+from marl_airhockey.registry import find_backend
+from marl_airhockey.starts import first_state, roll
+from marl_airhockey.table import GRAVITY, TABLES, Table, make_seat
+
+TABLE = TABLES["standard"]
+DT = 0.05
+IDLE = Command(np.zeros((1, 1, 2)))
+
+
+class Bench:
+    """One world of a backend with bodies where a test wants them."""
+
+    def __init__(self, backend, physics=None, pucks=1, table=TABLE, **cast):
+        self.cast = Cast(table, (make_seat("robot", table, 0),), pucks=pucks, **cast)
+        kind = find_backend(backend)
+        self.backend = kind(self.cast, 1, DT, kind.default_substeps)
+        values = {name: p.default for name, p in PARAMETERS.items()}
+        values.update({"tilt": 0.0, "puck_damping": 0.0}, **(physics or {}))
+        rows = {name: np.full(1, value) for name, value in values.items()}
+        self.backend.set_physics(rows, np.ones(1, bool))
+
+    def start(self, paddle, *others):
+        """Place the paddle at (x, y) and the others at (x, y, vx, vy)."""
+        state = first_state(self.cast, 1)
+        state.position[0, 0] = paddle
+        for i, (x, y, vx, vy) in enumerate(others, start=1):
+            state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
+        self.backend.start(state, np.ones(1, bool))
+        return state
+
+    def run(self, seconds, velocity=(0.0, 0.0)):
+        command = Command(np.array([[velocity]], dtype=float))
+        states = [self.backend.step(command) for _ in range(round(seconds / DT))]
+        return states
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.1, 0.3, 1.0, 3.0, 4.9])
+def test_a_wall_returns_its_share_of_the_normal_speed(backend, speed):
+    bench = Bench(backend)
+    bench.start((-0.6, -0.1), (0.0, 0.1, 0.5 * speed, 0.8 * speed))
+    states = bench.run(0.25 / speed + 3 * DT)
+    last = next(s for s in states if s.puck_velocity[0, 0, 1] < 0)
+    np.testing.assert_allclose(last.puck_velocity[0, 0, 1], -0.9 * 0.8 * speed, 1e-6)
+    np.testing.assert_allclose(last.puck_velocity[0, 0, 0], 0.5 * speed, 1e-6)
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.1, 0.3, 1.0, 3.0, 4.9])
+def test_a_still_paddle_returns_its_share(backend, speed):
+    bench = Bench(backend)
+    bench.start((-0.6, 0.0), (-0.4, 0.0, -speed, 0.0))
+    states = bench.run(0.13 / speed + 2 * DT)
+    np.testing.assert_allclose(states[-1].puck_velocity[0, 0], [0.85 * speed, 0], 1e-6)
+    assert sum(s.touched[0, 0, 0] for s in states) == 1
+    at = [s.touched_at[0, 0, 0] for s in states if s.touched[0, 0, 0]]
+    assert 0 < at[0] <= DT
+
+
+def test_a_moving_paddle_strikes_and_is_not_pushed_back(backend):
+    bench = Bench(backend)
+    bench.start((-0.7, 0.0), (-0.45, 0.0, 0.0, 0.0))
+    states = bench.run(0.5, velocity=(0.7, 0.0))
+    np.testing.assert_allclose(
+        states[-1].puck_velocity[0, 0], [1.85 * 0.7, 0], atol=1e-9
+    )
+    # The first step ramps up: it covers half of what a full one does.
+    np.testing.assert_allclose(states[-1].paddle[0, 0, 0], -0.7 + 0.7 * 9.5 * DT, 1e-9)
+
+
+def test_a_puck_moves_a_block_by_mass_and_restitution(backend):
+    bench = Bench(backend, {"block_friction": 0.0}, blocks=1)
+    bench.start((-0.7, 0.0), (0.0, 0.0, 1.0, 0.0), (0.3, 0.0, 0.0, 0.0))
+    last = bench.run(0.6)[-1]
+    np.testing.assert_allclose(last.block_velocity[0, 0, 0], 1.9 / 3, rtol=1e-6)
+    np.testing.assert_allclose(last.puck_velocity[0, 0, 0], 1 - 2 * 1.9 / 3, rtol=1e-6)
+
+
+def test_a_sliding_block_stops_by_coulomb_friction_and_rests_on_a_slope(backend):
+    bench = Bench(backend, {"tilt": 5.5}, pucks=0, blocks=1)
+    pull = GRAVITY * np.sin(np.radians(5.5))
+    bench.start((-0.7, 0.0), (0.0, 0.0, 1.0, 0.0))
+    states = bench.run(1.0)
+    way = states[-1].block[0, 0, 0]
+    np.testing.assert_allclose(way, 1.0 / (2 * (2.4 + pull)), rtol=0.03)
+    bench.start((-0.7, 0.0), (0.3, 0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(bench.run(2.0)[-1].block[0, 0], [0.3, 0.0])
+
+
+def test_a_falling_puck_follows_its_parabola(backend):
+    bench = Bench(backend, {"tilt": 5.5})
+    pull = GRAVITY * np.sin(np.radians(5.5))
+    bench.start((-0.7, 0.2), (0.5, -0.2, 0.3, 0.05))
+    for state in bench.run(1.5):
+        t = state.time[0]
+        np.testing.assert_allclose(
+            state.puck[0, 0],
+            [0.5 + 0.3 * t - pull * t * t / 2, -0.2 + 0.05 * t],
+            atol=1e-6,
+        )
+        np.testing.assert_allclose(
+            state.puck_velocity[0, 0, 0], 0.3 - pull * t, atol=1e-6
+        )
+
+
+def test_drag_decays_the_speed_exponentially(backend):
+    bench = Bench(backend, {"puck_damping": 0.8})
+    bench.start((-0.7, 0.2), (-0.3, 0.0, 0.5, 0.0))
+    for state in bench.run(1.5):
+        t = state.time[0]
+        np.testing.assert_allclose(
+            state.puck_velocity[0, 0, 0], 0.5 * np.exp(-0.8 * t), 1e-6
+        )
+
+
+def test_the_closed_form_of_banks_agrees(backend):
+    bench = Bench(backend, {"tilt": 5.5, "puck_damping": 0.15})
+    start = np.array([[-0.3, 0.1]]), np.array([[1.3, 0.9]])
+    bench.start((-0.7, -0.2), (*start[0][0], *start[1][0]))
+    states = bench.run(1.5)
+    times = np.array([s.time[0] for s in states])
+    pull = GRAVITY * np.sin(np.radians(5.5))
+    way = roll(*start, times, pull, 0.15, 0.3048 - 0.03175, 0.9)[0]
+    found = np.array([s.puck[0, 0] for s in states])
+    # A bank is found up to a substep late.
+    assert np.abs(found - way[:, :2]).max() < 0.9 * DT / 10 * 2
+
+
+@pytest.mark.parametrize("shape", ["disc", "square"])
+def test_blocks_of_both_shapes_are_moved_and_stop(backend, shape):
+    bench = Bench(backend, blocks=1, block_shape=shape)
+    bench.start((-0.7, 0.0), (0.0, 0.012, 1.5, 0.0), (0.3, 0.0, 0.0, 0.0))
+    states = bench.run(2.0)
+    assert 0.02 < states[-1].block[0, 0, 0] - 0.3 < 0.5
+    np.testing.assert_allclose(states[-1].block_velocity[0, 0], 0.0, atol=1e-9)
+    assert (states[-1].angle[0, 2] != 0) == (shape == "square")
+    np.testing.assert_allclose(states[-1].spin[0, 2], 0.0, atol=1e-9)
+
+
+def test_a_puck_in_a_goal_mouth_is_out_until_it_is_served(backend):
+    mouths = (Mouth("far", 2, 0.30), Mouth("home", 0))
+    bench = Bench(backend, mouths=mouths)
+    bench.start((-0.7, 0.0), (0.6, 0.05, 2.0, 0.0))
+    states = bench.run(0.6)
+    crossed = [s.crossed[0, 0] for s in states]
+    assert [tuple(c) for c in crossed if c.any()] == [(True, False)]
+    k = next(i for i, c in enumerate(crossed) if c.any())
+    np.testing.assert_allclose(
+        states[k].crossed_velocity[0, 0, 0], [2.0, 0.0], atol=1e-6
+    )
+    for state in states[k:]:
+        assert 0.838 < state.puck[0, 0, 0] < 0.88
+        np.testing.assert_array_equal(state.puck_velocity[0, 0], 0.0)
+    bench.start((-0.7, 0.0), (0.0, 0.0, -1.0, 0.2))
+    states = bench.run(1.0)
+    home = [i for i, s in enumerate(states) if s.crossed[0, 0, 1]]
+    assert home
+    assert not any(s.crossed[0, 0, 0] for s in states)
+    assert states[-1].puck_velocity[0, 0, 0] > 0
+
+
+def test_a_shot_beside_the_mouth_bounces(backend):
+    bench = Bench(backend, mouths=(Mouth("far", 2, 0.30),))
+    bench.start((-0.7, 0.0), (0.6, 0.22, 1.5, 0.0))
+    states = bench.run(0.6)
+    assert not any(s.crossed.any() for s in states)
+    np.testing.assert_allclose(states[-1].puck_velocity[0, 0, 0], -0.9 * 1.5, 1e-6)
+
+
+def test_obstacles_are_solid(backend):
+    post = Obstacle((0.2, 0.0), 0.05)
+    bench = Bench(backend, obstacles=(post,))
+    bench.start((-0.7, 0.2), (-0.2, 0.0, 1.0, 0.0))
+    last = bench.run(1.0)[-1]
+    np.testing.assert_allclose(last.puck_velocity[0, 0], [-0.9, 0.0], atol=1e-6)
+    np.testing.assert_array_equal(last.position[0, -1], [0.2, 0.0])
+
+
+def test_a_told_paddle_goes_where_it_is_told_and_too_fast_is_lifted(backend):
+    bench = Bench(backend)
+    bench.start((-0.6, 0.0), (-0.5, 0.0, 0.0, 0.0))
+    told = np.array([[[-0.55, 0.02, 0.3, 0.1]]])
+    state = bench.backend.step(Command(np.zeros((1, 1, 2)), told))
+    np.testing.assert_allclose(state.paddle[0, 0], told[0, 0, :2], atol=1e-12)
+    np.testing.assert_allclose(state.paddle_velocity[0, 0], told[0, 0, 2:], atol=1e-12)
+    bench.start((-0.6, 0.0), (-0.4, 0.0, 0.0, 0.0))
+    told = np.array([[[-0.1, 0.0, 0.0, 0.0]]])
+    state = bench.backend.step(Command(np.zeros((1, 1, 2)), told))
+    np.testing.assert_allclose(state.paddle[0, 0], [-0.1, 0.0], atol=1e-12)
+    assert not state.touched.any()
+    np.testing.assert_allclose(state.puck[0, 0], [-0.4, 0.0], atol=1e-12)
+
+
+def energy(state, pull):
+    """(B,) kinetic and potential energy of the pucks by mass, m2/s2."""
+    v, x = state.puck_velocity, state.puck[..., 0]
+    return (0.5 * (v * v).sum(-1) + pull * x).sum(-1)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    pucks=st.integers(1, 3),
+    tilt=st.floats(0, 12),
+    restitution=st.floats(0.3, 1.0),
+)
+def test_energy_never_rises_without_a_paddle(seed, pucks, tilt, restitution):
+    for backend in ah.backend_names():
+        physics = {"tilt": tilt, "wall_restitution": restitution, "puck_damping": 0.05}
+        bench = Bench(backend, physics, pucks=pucks)
+        rng = np.random.default_rng(seed)
+        rows = [
+            (0.25 * k, rng.uniform(-0.2, 0.2), *rng.uniform(-2, 2, 2))
+            for k in range(pucks)
+        ]
+        start = bench.start((-0.75, 0.25), *rows)
+        pull = GRAVITY * np.sin(np.radians(tilt))
+        before = energy(start, pull)
+        for state in bench.run(3.0):
+            if state.touched.any() or state.touching.any():
+                break
+            now = energy(state, pull)
+            # Overlap of a substep is taken back against the slope, and a contact sees
+            # the velocity of half a substep earlier.
+            slack = pucks * pull * (4.0 * DT / 10 + 0.002) + 1e-9
+            assert (now <= before + slack).all()
+            before = np.minimum(before, now)
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    seats=st.sampled_from(["robot", "arcade"]),
+    chase=st.floats(0, 1),
+    delay=st.sampled_from([0.0, 0.05, 0.08]),
+)
+def test_whatever_the_actions_nothing_impossible_happens(seed, seats, chase, delay):
+    """Reach, acceleration, table, speeds and separate paddles, two seats, a mouth."""
+    for backend in ah.backend_names():
+        world = ah.make_world(
+            Pair(seats=seats), 4, backend=backend, physics={"action_delay": delay}
+        )
+        world.reset(seed)
+        rng = np.random.default_rng(seed)
+        speed = world.physics.highest("paddle_speed")
+        most = world.physics.highest("paddle_acceleration") * DT
+        half = TABLE.size / 2
+        for k in range(120):
+            if k % 7 == 0:
+                wild = rng.uniform(-1, 1, (4, 2, 2)) * rng.choice([1, 3])
+            gap = world.state.puck - world.state.paddle
+            gap[:, 1] *= -1
+            actions = np.where(rng.random((4, 2, 1)) < chase, 10 * gap, wild)
+            before = world.state
+            step = world.step(actions)
+            live = ~(step.terminated | step.truncated)
+            after = world.state
+            live &= after.time > before.time
+            moved = after.paddle_velocity - before.paddle_velocity
+            size = np.linalg.norm(moved, axis=-1)[live]
+            assert (size <= most * (1 + 1e-9)).all()
+            inside = np.einsum("skd,bsd->bsk", world.reach.normals, after.paddle)
+            assert (inside + world.reach.offsets >= -1e-9).all()
+            top = np.linalg.norm(after.paddle_velocity, axis=-1)
+            assert (top <= speed * (1 + 1e-9)).all()
+            apart = np.linalg.norm(after.paddle[:, 0] - after.paddle[:, 1], axis=-1)
+            assert (apart >= 2 * TABLE.paddle_radius - 1e-9).all()
+            # The overlap of a hit stands for at most a substep.
+            slack = 0.002 + PUCK_SPEED_CAP * DT / 10 - TABLE.puck_radius
+            lane = np.abs(after.puck[..., 1]) > 0.15
+            assert (np.abs(after.puck[..., 1]) <= half[1] + slack).all()
+            assert (np.abs(after.puck[..., 0]) <= half[0] + slack)[lane].all()
+            pace = np.linalg.norm(after.puck_velocity, axis=-1)
+            assert (pace <= PUCK_SPEED_CAP + 1e-6).all()
+
+
+def test_two_paddles_meet_and_share_their_normal_speed(backend):
+    seat = make_seat("arcade", TABLE, 0)
+    kind = find_backend(backend)
+    cast = Cast(TABLE, (seat, seat))
+    table = kind(cast, 1, DT, kind.default_substeps)
+    state = first_state(cast, 1)
+    state.position[0] = [(-0.5, 0.0), (-0.3, 0.0)]
+    table.start(state, np.ones(1, bool))
+    pushing = Command(np.array([[[1.0, 0.3], [-0.4, 0.0]]]))
+    for _ in range(12):
+        state = table.step(pushing)
+        gap = np.linalg.norm(state.paddle[0, 0] - state.paddle[0, 1])
+        assert gap >= 2 * TABLE.paddle_radius - 1e-9
+    assert np.isfinite(state.position).all()
+
+
+def test_a_squeezed_puck_slips_away(backend):
+    bench = Bench(backend)
+    bench.start((-0.55, 0.0), (-0.55, 0.24, 0.0, 0.0))
+    fastest = 0.0
+    for _ in range(3):
+        for state in bench.run(0.35, velocity=(0.0, 0.7)) + bench.run(
+            0.35, (0.0, -0.7)
+        ):
+            assert np.abs(state.puck[0, 0, 1]) <= 0.3048
+            fastest = max(fastest, np.linalg.norm(state.puck_velocity[0, 0]))
+    assert fastest <= PUCK_SPEED_CAP + 1e-9
+
+
+@pytest.mark.parametrize("sides", [3, 4, 5])
+def test_pucks_stay_on_a_regular_polygon(backend, sides):
+    table = Table.regular(sides, 0.45)
+    seats = tuple(
+        make_seat("arcade", table, k, tuple(range(sides))) for k in range(sides)
+    )
+    kind = find_backend(backend)
+    cast = Cast(table, seats, pucks=2)
+    world = kind(cast, 1, DT, kind.default_substeps)
+    state = first_state(cast, 1)
+    for k, seat in enumerate(seats):
+        middle = np.mean(seat.reach, axis=0)
+        state.position[0, k] = middle @ table.rotation(seat.side)
+    state.velocity[0, sides:] = [(2.0, 0.7), (-1.1, 1.9)]
+    state.position[0, sides:] = [(0.05, 0.0), (-0.05, 0.0)]
+    world.start(state, np.ones(1, bool))
+    for _ in range(200):
+        state = world.step(Command(np.zeros((1, sides, 2))))
+        depth = state.puck[0] @ table.normals.T + table.offsets
+        assert (depth > 0).all()

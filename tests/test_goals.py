@@ -1,0 +1,86 @@
+"""Goal scenarios: reward, success and compute_reward agree, relabelled or not."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from stable_baselines3 import SAC, HerReplayBuffer
+from stable_baselines3.common.env_checker import check_env as check_env_sb3
+
+import marl_airhockey as ah
+from marl_airhockey.registry import gymnasium_id, make_scenario
+
+
+def test_every_goal_scenario_is_known_to_this_test(goal_scenario):
+    assert make_scenario(goal_scenario, goals="dict").goals == "dict"
+
+
+def test_only_goal_scenarios_have_dicts(scenario):
+    from conftest import GOALS
+
+    if scenario in GOALS:
+        return
+    with pytest.raises(ValueError, match="goal"):
+        ah.parallel_env(scenario, goals="dict")
+
+
+def test_it_passes_the_checks_of_goal_environments(goal_scenario):
+    env = gymnasium.make(gymnasium_id(goal_scenario), goals="dict")
+    check_env(env.unwrapped, skip_render_check=True)
+    check_env_sb3(env.unwrapped)
+
+
+def test_reward_success_and_compute_reward_agree(goal_scenario):
+    worlds = 24
+    driver = "reacher" if goal_scenario.startswith("reach") else "striker"
+    drivers = {"paddle_0": driver}
+    world = ah.make_world(goal_scenario, worlds, goals="dict", drivers=drivers)
+    world.autoreset = False
+    world.reset(0)
+    game = world.scenario
+    achieved, rewards = [], []
+    met = np.zeros(worlds, bool)
+    for _ in range(world.max_cycles):
+        step = world.step(np.zeros((worlds, 0, 2)))
+        achieved.append(game.achieved(world.state, world.memory))
+        wanted = game.desired(world.memory)
+        rewards.append(game.goal_reward(achieved[-1], wanted))
+        met |= rewards[-1] > 0
+        np.testing.assert_array_equal(world.episode.success[:, 0], met)
+        # Only a met goal ends it: a dropped puck does not.
+        np.testing.assert_array_equal(step.terminated, rewards[-1] > 0)
+    np.testing.assert_allclose(world.episode.returns[:, 0], np.sum(rewards, axis=0))
+    assert met.any()
+    # Relabelled: what was achieved at any moment is a goal that it met there.
+    late = np.array(achieved)
+    counts = np.ones(late.shape[:2], bool)
+    if goal_scenario.startswith("hit"):
+        counts = late[..., -1] > 0.5
+    np.testing.assert_array_equal(game.goal_reward(late, late) > 0, counts)
+
+
+def test_compute_reward_is_vectorised(goal_scenario):
+    env = gymnasium.make(gymnasium_id(goal_scenario), goals="dict").unwrapped
+    env.reset(seed=0)
+    size = env.observation_space["desired_goal"].shape[0]
+    goals = np.random.default_rng(0).uniform(-0.3, 0.3, (7, 5, size))
+    goals[..., -1] = 1.0
+    assert env.compute_reward(goals, goals, {}).shape == (7, 5)
+    assert env.compute_reward(goals[0, 0], goals[0, 0], {}).shape == ()
+
+
+def test_sac_with_her_runs_on_the_batched_environment():
+    venv = ah.make_sb3_vec("reach", 4, goals="dict")
+    model = SAC(
+        "MultiInputPolicy",
+        venv,
+        replay_buffer_class=HerReplayBuffer,
+        replay_buffer_kwargs={"n_sampled_goal": 4, "copy_info_dict": False},
+        learning_starts=300,
+        batch_size=64,
+        policy_kwargs={"net_arch": [16]},
+        seed=0,
+    )
+    model.learn(400)
+    assert model.num_timesteps >= 400
+    assert model.replay_buffer.sample(32).rewards.mean() > 0

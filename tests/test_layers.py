@@ -1,0 +1,85 @@
+"""Imports only go down, and the lower layers need nothing but numpy and numba."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
+LAYERS = (
+    {"state", "draws", "table"},
+    {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
+    | {"paddles", "scenario", "driver", "backend", "extras"},
+    {"backends", "registry", "registration"},
+    {"sensor", "observer", "seats", "render", "window", "world"},
+    {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
+    {"match", "film", "catalogue", "learn", "cli"},
+)
+PURE = sorted(LAYERS[0] | LAYERS[1])
+EXTRAS = [
+    "torch",
+    "stable_baselines3",
+    "cv2",
+    "pymunk",
+    "gymnasium",
+    "pettingzoo",
+    "PIL",
+    "typer",
+    "rich",
+    "pygame",
+    "matplotlib",
+    "onnxruntime",
+]
+
+
+def layer(module):
+    return next(i for i, names in enumerate(LAYERS) if module in names)
+
+
+def imports(path):
+    """Modules of this package that a file imports at its top level, with type hints."""
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(
+            "marl_airhockey."
+        ):
+            yield node.module.split(".")[1]
+
+
+def test_every_module_has_its_layer_and_imports_go_down():
+    for path in PACKAGE.rglob("*.py"):
+        parts = path.relative_to(PACKAGE).parts
+        name = parts[0].removesuffix(".py")
+        if name == "__init__":
+            continue
+        for other in imports(path):
+            assert layer(other) <= layer(name), f"{path} imports {other}"
+
+
+def test_leaves_import_only_the_core():
+    for folder in ("scenarios", "agents"):
+        for path in (PACKAGE.parent / folder).glob("*.py"):
+            for other in imports(path):
+                allowed = layer(other) <= 1 or (folder, other) == ("agents", "learn")
+                assert allowed, f"{path} imports {other}"
+
+
+@pytest.mark.parametrize("module", PURE)
+def test_lower_layers_import_with_extras_blocked(module):
+    program = (
+        "import sys, types\n"
+        f"for name in {EXTRAS!r}: sys.modules[name] = None\n"
+        "package = types.ModuleType('marl_airhockey')\n"
+        f"package.__path__ = [{str(PACKAGE)!r}]\n"
+        "sys.modules['marl_airhockey'] = package\n"
+        f"import marl_airhockey.{module}\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_nothing_uses_a_global_random_generator():
+    for path in [*PACKAGE.rglob("*.py"), *PACKAGE.parent.glob("[sa]*s/*.py")]:
+        text = path.read_text()
+        for word in ("np.random.seed", "np.random.rand", "import random\n"):
+            assert word not in text, path
