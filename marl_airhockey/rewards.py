@@ -103,8 +103,6 @@ def contact_height(before: State, after: State) -> Array:
     It is where the puck flew to until the contact began, and where it is now while the
     contact lasts; nan if there was none.
     """
-    if not after.contact:
-        return np.full(after.puck.shape[:-1], np.nan)
     at = np.where(after.touched > 0, after.touched_at, np.nan)
     last = np.fmax.reduce(at, axis=-2)
     met = before.puck[..., 0] + before.puck_velocity[..., 0] * last

@@ -12,7 +12,7 @@ LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "scenario", "driver", "backend", "extras"},
-    {"backends", "registry", "registration"},
+    {"backends", "chipmunk", "registry", "registration"},
     {"sensor", "observer", "seats", "render", "window", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
     {"match", "film", "catalogue", "learn", "cli"},

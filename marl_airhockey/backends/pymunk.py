@@ -17,6 +17,14 @@ from pymunk._chipmunk_cffi import ffi, lib
 
 from marl_airhockey.backend import TOLD_SPEED, Backend, Command
 from marl_airhockey.cast import Cast
+from marl_airhockey.chipmunk import (
+    AVAILABLE,
+    EVENT,
+    SUBSTEP,
+    address,
+    drift,
+    new_flags,
+)
 from marl_airhockey.paddles import meet
 from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.state import Array, State, still_state
@@ -33,15 +41,24 @@ POCKET = 100.0
 
 
 class Space:
-    """One world: a pymunk space with paddles, pucks, blocks, walls and mouths."""
+    """One world: a pymunk space with paddles, pucks, blocks, walls and mouths.
 
-    def __init__(self, cast: Cast, control_dt: float, substeps: int) -> None:
+    Args:
+        cast: who is on the table.
+        control_dt: s.
+        substeps: physics steps in a control step.
+        flags: (2,) this world's row of `chipmunk.new_flags`.
+    """
+
+    def __init__(
+        self, cast: Cast, control_dt: float, substeps: int, flags: Array
+    ) -> None:
         self.cast, self.control_dt, self.substeps = cast, control_dt, substeps
+        self.flags = flags
         self.sim_dt = control_dt / substeps
         self.space = space = pymunk.Space()
         # Overlap goes at once; contacts rest with a tenth of a millimetre of it.
         space.collision_slop, space.collision_bias = 1e-4, 0.0
-        self._substep = 0
         self._out: dict[int, tuple[float, float]] = {}
         bodies = cast.bodies
         pairs = (bodies.paddles, bodies.pucks)
@@ -50,7 +67,6 @@ class Space:
         self.touching = np.zeros(pairs, np.bool_)
         self.crossed = np.zeros((bodies.pucks, len(cast.mouths)), np.bool_)
         self.crossed_velocity = np.zeros((*self.crossed.shape, 2))
-        self._events = False
         self._shapes: dict[pymunk.Shape, int] = {}
         self._build_bodies()
         self._build_walls()
@@ -178,9 +194,9 @@ class Space:
         paddle, puck = arbiter.shapes
         pair = self._shapes[paddle], self._shapes[puck]
         self.touched[pair] += 1
-        self.touched_at[pair] = (self._substep + 1) * self.sim_dt
+        self.touched_at[pair] = (self.flags[SUBSTEP] + 1) * self.sim_dt
         self.touching[pair] = True
-        self._events = True
+        self.flags[EVENT] = 1
 
     def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         paddle, puck = arbiter.shapes
@@ -194,7 +210,7 @@ class Space:
             return
         self.crossed[pair] = True
         self.crossed_velocity[pair] = body.velocity
-        self._events = True
+        self.flags[EVENT] = 1
         if mouth.sensor:
             self._out[pair[0]] = body.position
 
@@ -244,7 +260,7 @@ class Space:
             lib.cpSpaceReindexShapesForBody(self._space, body._body)
         self._out.clear()
         self.touching[:] = False
-        self._events = True
+        self.flags[EVENT] = 1
 
     def step(
         self,
@@ -253,8 +269,8 @@ class Space:
         goal: Array,
         told: Array,
         path: Array | None,
-    ) -> bool:
-        """Move by ``control_dt``; True if anything touched, crossed or is out.
+    ) -> None:
+        """Move by ``control_dt``, or by what `chipmunk.drift` has left of it.
 
         Args:
             position: (paddles, 2) now, m; changed in place.
@@ -263,43 +279,38 @@ class Space:
             told: (paddles,) bool: moves at ``goal`` all the time and does not yield.
             path: (substeps + 1, movers, 4) to be filled, or None.
         """
-        self._begin()
-        n, dt, raw, space = self.substeps, self.sim_dt, self._raw, self._space
+        n, flags, first = self.substeps, self.flags, int(self.flags[SUBSTEP]) + 1
         set_velocity, advance = lib.cpBodySetVelocity, lib.cpSpaceStep
         if path is not None:
             path[0] = self.read()
-        alone = len(raw) and len(position) == 1
-        if alone:
-            (x, y), (gx, gy) = velocity[0].tolist(), goal[0].tolist()
-            rx, ry = ((gx - x) / n, (gy - y) / n) if not told[0] else (0.0, 0.0)
-            x, y = (x + 0.5 * rx, y + 0.5 * ry) if not told[0] else (gx, gy)
-        else:
-            velocity[told] = goal[told]
-            ramp = (goal - velocity) / n
-        for k in range(n):
-            self._substep = k
+        velocity[told] = goal[told]
+        ramp = (goal - velocity) / n
+        alone = len(position) == 1
+        (rx, ry), (x, y) = ramp[0].tolist(), (velocity[0] + 0.5 * ramp[0]).tolist()
+        if first:
+            self._settle()
+        for k in range(first, n):
+            flags[SUBSTEP] = k
             if alone:
-                set_velocity(raw[0], (x + k * rx, y + k * ry))
+                set_velocity(self._raw[0], (x + k * rx, y + k * ry))
             else:
                 self._drive(position, velocity, ramp, told)
-            advance(space, dt)
-            if self._events:
+            advance(self._space, self.sim_dt)
+            if flags[EVENT]:
                 self._settle()
             if path is not None:
                 path[k + 1] = self.read()
         if alone:
             velocity[0] = goal[0]
-        return self._events
 
-    def _begin(self) -> None:
-        if not self._events:
-            return
+    def begin(self) -> None:
+        """Forget the events of the last step."""
         self.touched[:] = 0
         self.touched_at[:] = np.nan
         self.crossed[:] = False
         for k in self._out:
             self._park(k)
-        self._events = bool(self._out) or bool(self.touching.any())
+        self.flags[EVENT] = bool(self._out) or bool(self.touching.any())
 
     def _drive(
         self, position: Array, velocity: Array, ramp: Array, told: Array
@@ -381,6 +392,11 @@ class Space:
         self.paddles[paddle].filter = pymunk.ShapeFilter(mask=mask)
 
     @property
+    def pointers(self) -> tuple[int, int]:
+        """Addresses of the space and of the first paddle's body."""
+        return address(self._space), address(self._raw[0])
+
+    @property
     def out(self) -> dict[int, tuple[float, float]]:
         """Pucks out of play and where they went, m."""
         return self._out
@@ -396,7 +412,10 @@ class Pymunk(Backend):
         self, cast: Cast, num_worlds: int, control_dt: float, substeps: int
     ) -> None:
         super().__init__(cast, num_worlds, control_dt, substeps)
-        self.spaces = [Space(cast, control_dt, substeps) for _ in range(num_worlds)]
+        self._flags = new_flags(num_worlds)
+        self.spaces = [Space(cast, control_dt, substeps, row) for row in self._flags]
+        self._pointers = np.array([space.pointers for space in self.spaces], np.int64).T
+        self._drifts = AVAILABLE and len(cast.seats) == 1 and not cast.path
         mouths = len(cast.mouths)
         self.state = still_state(cast.bodies, num_worlds, mouths)
         self._steps = np.zeros(num_worlds, np.int64)
@@ -430,12 +449,16 @@ class Pymunk(Backend):
         if self.cast.path:
             shape = (self.num_worlds, self.substeps + 1, bodies.movers, 4)
             path = np.empty(shape)
-        eventful = []
-        for i, space in enumerate(self.spaces):
+        flags = self._flags
+        for i in flags[:, EVENT].nonzero()[0].tolist():
+            self.spaces[i].begin()
+        left = self._drift(velocity, goal, lifted is not None)
+        for i in left:
             way = None if path is None else path[i]
-            if space.step(position[i], velocity[i], goal[i], told[i], way):
-                eventful.append(i)
+            self.spaces[i].step(position[i], velocity[i], goal[i], told[i], way)
+        for i, space in enumerate(self.spaces):
             rows[i] = space.read()
+        eventful = flags[:, EVENT].nonzero()[0].tolist()
         rows[:, :s, 2:] = velocity
         rows[:, bodies.puck, 2] += self._kicks
         if path is not None:
@@ -456,6 +479,21 @@ class Pymunk(Backend):
             new = self._with_turns(new)
         self.state = new
         return new
+
+    def _drift(self, velocity: Array, goal: Array, any_told: bool) -> list[int]:
+        """Step the quiet worlds in compiled code; those that Python must finish."""
+        flags = self._flags
+        if not self._drifts or any_told:
+            flags[:, SUBSTEP] = -1
+            return list(range(self.num_worlds))
+        sim_dt = self.control_dt / self.substeps
+        start = velocity[:, 0].copy()
+        drift(*self._pointers, start, goal[:, 0], self.substeps, sim_dt, flags)
+        left: list[int] = flags[:, EVENT].nonzero()[0].tolist()
+        velocity[:, 0] = goal[:, 0]
+        for i in left:
+            velocity[i, 0] = start[i]
+        return left
 
     def _with_events(self, state: State, worlds: list[int]) -> State:
         """The state with the contacts and crossings of some worlds."""

@@ -1,0 +1,88 @@
+"""Chipmunk's own step driven from compiled code: most substeps need no Python.
+
+A paddle's velocity is set and the space is stepped, substep by substep, until something
+touches; from there Python goes on. The functions are called by their addresses. A
+vector of two doubles passed by value takes the place of two double arguments on Unix
+(x86-64 and ARM64); elsewhere, or if a check at import fails, `AVAILABLE` is False.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from typing import Any
+
+import numpy as np
+import pymunk
+from numba import njit
+from pymunk._chipmunk_cffi import ffi, lib
+
+from marl_airhockey.state import Array
+
+EVENT, SUBSTEP = 0, 1
+"""Columns of the flags: whether anything touches, and the substep that is running."""
+
+
+def address(thing: Any) -> int:
+    """The address of a Chipmunk object."""
+    return int(ffi.cast("uintptr_t", thing))
+
+
+def _function(name: str, *arguments: Any) -> Any:
+    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *arguments)
+    return kind(address(ffi.addressof(lib, name)))
+
+
+_set_velocity = _function("cpBodySetVelocity", ctypes.c_double, ctypes.c_double)
+_advance = _function("cpSpaceStep", ctypes.c_double)
+
+
+@njit
+def drift(
+    spaces: Array,
+    paddles: Array,
+    velocity: Array,
+    goal: Array,
+    substeps: int,
+    dt: float,
+    flags: Array,
+) -> None:
+    """Step quiet worlds with one paddle each until the end or the first event.
+
+    Args:
+        spaces: (B,) addresses of the spaces.
+        paddles: (B,) addresses of the paddles' bodies.
+        velocity: (B, 2) at the start, m/s.
+        goal: (B, 2) at the end, m/s; the ramp between them is linear.
+        substeps: physics steps in the control step.
+        dt: of a substep, s.
+        flags: (B, 2) EVENT, set by callbacks, and SUBSTEP. A world whose EVENT is set
+            before is left alone, with SUBSTEP -1.
+    """
+    for b in range(len(spaces)):
+        rx = (goal[b, 0] - velocity[b, 0]) / substeps
+        ry = (goal[b, 1] - velocity[b, 1]) / substeps
+        x, y = velocity[b, 0] + 0.5 * rx, velocity[b, 1] + 0.5 * ry
+        flags[b, SUBSTEP] = -1
+        for k in range(substeps):
+            if flags[b, EVENT]:
+                break
+            flags[b, SUBSTEP] = k
+            _set_velocity(paddles[b], x + k * rx, y + k * ry)
+            _advance(spaces[b], dt)
+
+
+def _works() -> bool:
+    if os.name != "posix":
+        return False
+    body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    _set_velocity(address(body._body), 0.25, -0.75)
+    return tuple(body.velocity) == (0.25, -0.75)
+
+
+AVAILABLE = _works()
+
+
+def new_flags(worlds: int) -> Array:
+    """(B, 2) flags for `drift`."""
+    return np.zeros((worlds, 2), np.int64)
