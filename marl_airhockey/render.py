@@ -153,6 +153,10 @@ def draw(scene: Scene, width: int = 880) -> Array:
     for trail in scene.trails:
         _trail(canvas, trail, scene.cast.table.puck_radius)
     _bodies(canvas, scene.cast, scene.state)
+    for mark in scene.marks:
+        # A goal that a paddle can hide is drawn over it.
+        if mark.kind == "circle" and mark.radius < scene.cast.table.paddle_radius:
+            canvas.ring(mark.start, mark.radius, GOAL, 2)
     _bar(canvas, scene)
     return canvas.picture()
 

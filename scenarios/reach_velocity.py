@@ -104,7 +104,7 @@ class ReachVelocity(GoalScenario):
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         goal, velocity = memory["goal"], memory["goal_velocity"]
-        return [Mark.circle(goal, self.radius), Mark.arrow(goal, velocity)]
+        return [Mark.circle(goal, self.radius), Mark.arrow(goal, 0.2 * velocity)]
 
 
 make = ReachVelocity
