@@ -37,7 +37,7 @@ _set_velocity = _function("cpBodySetVelocity", ctypes.c_double, ctypes.c_double)
 _advance = _function("cpSpaceStep", ctypes.c_double)
 
 
-@njit
+@njit(cache=False)
 def drift(
     spaces: Array,
     paddles: Array,

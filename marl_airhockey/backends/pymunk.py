@@ -488,7 +488,8 @@ class Pymunk(Backend):
             return list(range(self.num_worlds))
         sim_dt = self.control_dt / self.substeps
         start = velocity[:, 0].copy()
-        drift(*self._pointers, start, goal[:, 0], self.substeps, sim_dt, flags)
+        spaces, paddles = self._pointers
+        drift(spaces, paddles, start, goal[:, 0], self.substeps, sim_dt, flags)
         left: list[int] = flags[:, EVENT].nonzero()[0].tolist()
         velocity[:, 0] = goal[:, 0]
         for i in left:
