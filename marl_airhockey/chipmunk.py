@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pymunk
+import pymunk.batch
 from numba import njit
 from pymunk._chipmunk_cffi import ffi, lib
 
@@ -70,6 +71,33 @@ def drift(
             flags[b, SUBSTEP] = k
             _set_velocity(paddles[b], x + k * rx, y + k * ry)
             _advance(spaces[b], dt)
+
+
+class Reader:
+    """Reads all bodies of a space into one kept buffer, in the order they were added.
+
+    pymunk's public call builds a struct at every read.
+    """
+
+    def __init__(self, space: pymunk.Space, bodies: int) -> None:
+        fields = pymunk.batch.BodyFields
+        wanted = fields.POSITION | fields.VELOCITY
+        self._buffer = pymunk.batch.Buffer()
+        pymunk.batch.get_space_bodies(space, wanted, self._buffer)
+        self._data = ffi.new("pmBatchedData *")
+        self._data.fields = wanted.value
+        self._data.floatArray = self._buffer._float_arr
+        self._data.intArray = self._buffer._int_arr
+        self._each = ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched")
+        flat = np.frombuffer(self._buffer.float_buf(), dtype=np.float64)
+        self._rows = flat.reshape(-1, 4)[:bodies]
+        self._space = space._space
+
+    def __call__(self) -> Array:
+        """(bodies, 4) x, y, vx, vy; the same memory at every call."""
+        self._buffer._float_arr.num = 0
+        lib.cpSpaceEachBody(self._space, self._each, self._data)
+        return self._rows
 
 
 def _works() -> bool:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
 import numpy as np
+from PIL import Image
 
 from marl_airhockey.driver import Driver
 from marl_airhockey.make import Keywords, build_world
-from marl_airhockey.render import Renderer, draw, write_video
+from marl_airhockey.render import Renderer, draw
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
 
@@ -73,3 +76,37 @@ def film(
     renderer.close()
     world.close()
     return pictures
+
+
+def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path:
+    """Write pictures (H, W, 3) as a .gif or an .mp4.
+
+    Raises:
+        ValueError: no picture, or another ending.
+        OSError: the file could not be written.
+    """
+    path = Path(path)
+    if not pictures:
+        raise ValueError("video: no pictures to write")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix == ".gif":
+        # One palette and no dithering: frames then differ only where things move.
+        palette = Image.fromarray(pictures[0]).quantize(128)
+        frames = [
+            Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
+            for p in pictures
+        ]
+        rest, lasts = frames[1:], round(1000 / fps)
+        frames[0].save(path, append_images=rest, save_all=True, duration=lasts, loop=0)
+    elif path.suffix == ".mp4":
+        size = (pictures[0].shape[1], pictures[0].shape[0])
+        code = cv2.VideoWriter.fourcc(*"mp4v")
+        writer = cv2.VideoWriter(str(path), code, fps, size)
+        if not writer.isOpened():
+            raise OSError(f"video: {path} could not be written")
+        for picture in pictures:
+            writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        writer.release()
+    else:
+        raise ValueError(f"video: {path.name!r} must end in .gif or .mp4")
+    return path

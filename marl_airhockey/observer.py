@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from marl_airhockey.layout import FRAMES, OBSERVE, Ego, Layout, Scope
 from marl_airhockey.physics import Physics, unknown
 from marl_airhockey.scenario import GoalScenario, Scenario
 from marl_airhockey.sensor import Sensor
 from marl_airhockey.state import Array, Memory, State
-from marl_airhockey.views import FRAMES, OBSERVE, Ego, Layout, Scope
 
 Observation = Array | Mapping[str, Array]
 """(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
@@ -24,7 +24,7 @@ class Observer:
         scenario: lists the pieces.
         sensor: keeps the history.
         physics: tells the top speed.
-        observe: the form for open seats, see `views.OBSERVE`.
+        observe: the form for open seats, see `layout.OBSERVE`.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Observer:
         return {"observation": flat, **shown}
 
     def _pictures(self, memory: Memory, seats: Array) -> Array:
-        from marl_airhockey.render import small_picture
+        from marl_airhockey.pixels import small_picture
 
         cast, frames = self.scenario.cast, self.sensor.frames
         shape = (len(frames), len(seats), PIXELS, PIXELS, FRAMES)

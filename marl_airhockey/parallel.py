@@ -8,6 +8,7 @@ from typing import Any, Unpack
 import numpy as np
 from pettingzoo import ParallelEnv
 
+from marl_airhockey.episode import Step
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.spaces import (
@@ -17,7 +18,6 @@ from marl_airhockey.spaces import (
     state_space,
 )
 from marl_airhockey.state import Array
-from marl_airhockey.world import Step
 
 Dicts = tuple[
     dict[str, Any],

@@ -1,7 +1,7 @@
 """Pictures of the 2D table: anti-aliased, from above, home on the left.
 
 One function draws a scene; the environment's `render`, the pictures in the docs and
-the videos all come from it.
+the films all come from it.
 """
 
 from __future__ import annotations
@@ -9,20 +9,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-from PIL import Image
 
+from marl_airhockey.canvas import SMOOTH, Canvas, Colour
 from marl_airhockey.cast import Cast
 from marl_airhockey.physics import unknown
 from marl_airhockey.scenario import Mark
 from marl_airhockey.state import Array, State
-from marl_airhockey.table import Table
 
-Colour = tuple[int, int, int]
 SEAT_COLOURS: tuple[Colour, ...] = (
     (0, 114, 178),
     (213, 94, 0),
@@ -32,7 +28,7 @@ SEAT_COLOURS: tuple[Colour, ...] = (
     (230, 159, 0),
 )
 """RGB; Okabe and Ito's palette, which colour-blind people can tell apart."""
-ROOM, RAIL, FIELD = (236, 239, 243), (52, 62, 76), (250, 251, 253)
+RAIL, FIELD = (52, 62, 76), (250, 251, 253)
 PRINT, FAINT, INK = (168, 196, 224), (214, 226, 238), (34, 40, 49)
 PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
     (46, 52, 64),
@@ -41,10 +37,6 @@ PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
     (150, 112, 50),
 )
 GOAL = (200, 60, 90)
-SMOOTH = 2
-"""Drawn this many times larger, then averaged."""
-SHIFT = 6
-"""Fractional bits of OpenCV's coordinates."""
 
 
 @dataclass(frozen=True)
@@ -63,85 +55,6 @@ class Scene:
     clock: float = 0.0
     """Share of the episode that is over."""
     success: bool = False
-
-
-class Canvas:
-    """A picture in metres: the table's bounding box and a margin."""
-
-    def __init__(self, table: Table, width: int, margin: float, bar: int) -> None:
-        corners = np.asarray(table.vertices)
-        self.low, high = corners.min(0) - margin, corners.max(0) + margin
-        self.scale = SMOOTH * width / float(high[0] - self.low[0])
-        self.bar = SMOOTH * bar
-        tall = round(float(high[1] - self.low[1]) * self.scale) + self.bar
-        # Even sizes: video codecs want them.
-        tall += -tall % (2 * SMOOTH)
-        self.image = np.full((tall, SMOOTH * width, 3), ROOM, np.uint8)
-        self.bottom = tall
-
-    def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
-        """Fixed-point pixel of a point in metres."""
-        x = (float(point[0]) - self.low[0]) * self.scale
-        y = self.bottom - (float(point[1]) - self.low[1]) * self.scale
-        return round(x * 2**SHIFT), round(y * 2**SHIFT)
-
-    def disc(
-        self, centre: Sequence[float] | Array, radius: float, colour: Colour
-    ) -> None:
-        """A filled disc, m."""
-        size = max(round(radius * self.scale * 2**SHIFT), 1)
-        cv2.circle(self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT)
-
-    def ring(
-        self,
-        centre: Sequence[float] | Array,
-        radius: float,
-        colour: Colour,
-        width: float = 1.5,
-    ) -> None:
-        """A circle; its line is ``width`` pixels wide."""
-        size = max(round(radius * self.scale * 2**SHIFT), 1)
-        line = max(round(width * SMOOTH), 1)
-        cv2.circle(
-            self.image, self.pixel(centre), size, colour, line, cv2.LINE_AA, SHIFT
-        )
-
-    def line(
-        self,
-        start: Sequence[float] | Array,
-        end: Sequence[float] | Array,
-        colour: Colour,
-        width: float = 1.5,
-    ) -> None:
-        """A straight line."""
-        wide = max(round(width * SMOOTH), 1)
-        a, b = self.pixel(start), self.pixel(end)
-        cv2.line(self.image, a, b, colour, wide, cv2.LINE_AA, SHIFT)
-
-    def polygon(self, corners: Array, colour: Colour, width: float = 0.0) -> None:
-        """A filled polygon, or its outline if ``width`` is given."""
-        points = np.array([self.pixel(c) for c in corners], np.int32)
-        if width:
-            wide = max(round(width * SMOOTH), 1)
-            cv2.polylines(self.image, [points], True, colour, wide, cv2.LINE_AA, SHIFT)
-        else:
-            cv2.fillPoly(self.image, [points], colour, cv2.LINE_AA, SHIFT)
-
-    def text(
-        self, words: str, x: int, size: float, colour: Colour, right: bool
-    ) -> None:
-        """Words in the title bar, ``x`` pixels from its left or right end."""
-        font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
-        scale = size * SMOOTH
-        (wide, high), _ = cv2.getTextSize(words, font, scale, thick)
-        left = self.image.shape[1] - x * SMOOTH - wide if right else x * SMOOTH
-        place = (left, (self.bar + high) // 2)
-        cv2.putText(self.image, words, place, font, scale, colour, thick, cv2.LINE_AA)
-
-    def picture(self) -> Array:
-        """The finished picture (H, W, 3) uint8 RGB."""
-        size = (self.image.shape[1] // SMOOTH, self.image.shape[0] // SMOOTH)
-        return np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA))
 
 
 def draw(scene: Scene, width: int = 880) -> Array:
@@ -272,42 +185,6 @@ def _dark(colour: Colour) -> Colour:
     return r, g, b
 
 
-def small_picture(
-    cast: Cast, position: Array, goal: Array | None, turn: Array, seat: int, size: int
-) -> Array:
-    """What a seat sees as pixels: (size, size) uint8 grey, ego frame.
-
-    Args:
-        cast: who is on the table.
-        position: (N, 2) sensed positions, table frame, m.
-        goal: (2,) wanted place, or None.
-        turn: (2, 2) from the table frame to the seat's ego frame.
-        seat: the seat's index; its own paddle is the brighter one.
-        size: pixels.
-    """
-    image = np.zeros((size, size), np.uint8)
-    corners = np.asarray(cast.table.vertices) @ turn.T
-    extent = float(np.abs(corners).max())
-    scale = (size / 2 - 1) / extent
-
-    def pixel(point: Array) -> tuple[int, int]:
-        x, y = turn @ point * scale
-        return round((size / 2 + x) * 2**SHIFT), round((size / 2 - y) * 2**SHIFT)
-
-    outline = np.array([pixel(np.asarray(c)) for c in cast.table.vertices], np.int32)
-    cv2.fillPoly(image, [outline], 50, cv2.LINE_AA, SHIFT)
-    if goal is not None:
-        wide = round(0.05 * scale * 2**SHIFT)
-        cv2.circle(image, pixel(goal), wide, 110, 1, cv2.LINE_AA, SHIFT)
-    for k, (kind, radius) in enumerate(
-        zip(cast.bodies.kind, cast.bodies.radius, strict=True)
-    ):
-        grey = (140, 255, 90, 70)[kind] + (60 if k == seat else 0)
-        wide = round(radius * scale * 2**SHIFT)
-        cv2.circle(image, pixel(position[k]), wide, grey, -1, cv2.LINE_AA, SHIFT)
-    return image
-
-
 @dataclass
 class Renderer:
     """Shows one world of an environment, in a window if ``mode`` is human."""
@@ -380,37 +257,3 @@ class Renderer:
         if self._window is not None:
             self._window.close()
             self._window = None
-
-
-def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path:
-    """Write pictures (H, W, 3) as a .gif or an .mp4.
-
-    Raises:
-        ValueError: no picture, or another ending.
-        OSError: the file could not be written.
-    """
-    path = Path(path)
-    if not pictures:
-        raise ValueError("video: no pictures to write")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if path.suffix == ".gif":
-        # One palette and no dithering: frames then differ only where things move.
-        palette = Image.fromarray(pictures[0]).quantize(128)
-        frames = [
-            Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
-            for p in pictures
-        ]
-        rest, lasts = frames[1:], round(1000 / fps)
-        frames[0].save(path, append_images=rest, save_all=True, duration=lasts, loop=0)
-    elif path.suffix == ".mp4":
-        size = (pictures[0].shape[1], pictures[0].shape[0])
-        code = cv2.VideoWriter.fourcc(*"mp4v")
-        writer = cv2.VideoWriter(str(path), code, fps, size)
-        if not writer.isOpened():
-            raise OSError(f"video: {path} could not be written")
-        for picture in pictures:
-            writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-        writer.release()
-    else:
-        raise ValueError(f"video: {path.name!r} must end in .gif or .mp4")
-    return path

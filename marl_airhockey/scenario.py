@@ -16,10 +16,10 @@ import numpy as np
 from marl_airhockey import rewards
 from marl_airhockey.cast import Cast
 from marl_airhockey.draws import Draws
+from marl_airhockey.layout import Piece
 from marl_airhockey.physics import unknown
 from marl_airhockey.state import Array, Memory, State
 from marl_airhockey.table import SEAT_KINDS, TABLES, Seat, Table, make_seat
-from marl_airhockey.views import Piece
 
 
 class Mark(NamedTuple):

@@ -11,9 +11,9 @@ import numpy as np
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.draws import Draws
+from marl_airhockey.layout import FRAMES, HISTORY
 from marl_airhockey.physics import Physics
 from marl_airhockey.state import Array, State
-from marl_airhockey.views import FRAMES, HISTORY
 
 OCCLUSION_SECONDS = 0.1
 """s: mean length of an occlusion."""

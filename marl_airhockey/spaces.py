@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from marl_airhockey.layout import FRAMES
 from marl_airhockey.observer import PIXELS, Observer
 from marl_airhockey.physics import PUCK_SPEED_CAP
 from marl_airhockey.scenario import GoalScenario
 from marl_airhockey.state import Array
-from marl_airhockey.views import FRAMES
 from marl_airhockey.world import World
 
 

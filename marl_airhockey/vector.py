@@ -8,13 +8,13 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from marl_airhockey.episode import Step
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.observer import Observation
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.single import check_one_open
 from marl_airhockey.spaces import action_space, observation_space
 from marl_airhockey.state import Array
-from marl_airhockey.world import Step
 
 
 class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):

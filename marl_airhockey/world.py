@@ -6,13 +6,14 @@ Everything above (PettingZoo, Gymnasium, vector environments) is a thin view of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from marl_airhockey.backend import Backend, Command
 from marl_airhockey.draws import Draws
+from marl_airhockey.episode import Episode, Step
 from marl_airhockey.limits import Excess, Reach, limits
 from marl_airhockey.observer import Observation, Observer
 from marl_airhockey.physics import Physics
@@ -20,52 +21,6 @@ from marl_airhockey.scenario import Scenario
 from marl_airhockey.seats import Driven
 from marl_airhockey.sensor import Delay, Sensor
 from marl_airhockey.state import Array, Memory, State, still_state
-
-
-@dataclass
-class Step:
-    """What a step of B worlds gives, for its open seats; arrays (B, ...)."""
-
-    observation: Observation
-    reward: Array
-    """(B, open)"""
-    terminated: Array
-    """(B,) the episode ended for a reason inside the game"""
-    truncated: Array
-    """(B,) the clock ended it"""
-    terms: dict[str, Array]
-    """Reward terms by name, (B, open) each"""
-    sent: Array
-    """(B, open, 2) what acted: velocity as a fraction of top speed, ego frame"""
-    excess: Excess
-    """By how much what was asked exceeded the limits, (B, seats) each"""
-    cost: Array
-    """(B, open) the excesses in units of their limits, summed"""
-    success: Array
-    """(B, open) bool, latched for the episode"""
-    first_shot: Array
-    """(B,) bool: succeeded before a second distinct touch"""
-    final_observation: Observation | None = None
-    """Observations at the end of the episodes that ended, rows of all others stale;
-    None if none ended or worlds do not restart by themselves"""
-
-
-@dataclass
-class Episode:
-    """Counters of the running episodes, (B, ...) each."""
-
-    number: Array
-    """Episodes begun since the last seed"""
-    cycles: Array
-    """Control steps taken"""
-    returns: Array
-    """(B, seats) sum of rewards"""
-    success: Array
-    """(B, seats) latched"""
-    first_shot: Array
-    """(B,) latched"""
-    physics: dict[str, Array] = field(default_factory=dict)
-    """Physical parameters, (B,) each"""
 
 
 class World:
@@ -76,7 +31,7 @@ class World:
         backend: the physics, built for the scenario's cast.
         drivers: drivers of the seats that are not open, by seat index.
         physics: parameters and their ranges.
-        observe: how pucks are shown to open seats, see `views.OBSERVE`.
+        observe: how pucks are shown to open seats, see `layout.OBSERVE`.
         max_cycles: length of an episode in control steps; None for the scenario's.
         autoreset: begin a new episode at once where one ended.
     """

@@ -11,9 +11,10 @@ PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
 LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
-    | {"paddles", "scenario", "driver", "backend", "extras"},
-    {"backends", "chipmunk", "registry", "registration"},
-    {"sensor", "observer", "seats", "render", "window", "world"},
+    | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"},
+    {"backends", "chipmunk", "space", "registry", "registration"},
+    {"sensor", "observer", "seats", "canvas", "pixels", "render", "window"}
+    | {"episode", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
     {"match", "film", "catalogue", "learn", "cli"},
 )

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from marl_airhockey.film import film
 from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.keeper import Report
 from marl_airhockey.learn.plots import learning_curve
 from marl_airhockey.learn.policy import load_policy
-from marl_airhockey.learn.train import Report, train, versions
+from marl_airhockey.learn.train import train, versions
 from marl_airhockey.match import Result, evaluate
 from marl_airhockey.registry import make_agent
 

@@ -1,0 +1,55 @@
+"""What a step gives, and the counters of the running episodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from marl_airhockey.limits import Excess
+from marl_airhockey.observer import Observation
+from marl_airhockey.state import Array
+
+
+@dataclass
+class Step:
+    """What a step of B worlds gives, for its open seats; arrays (B, ...)."""
+
+    observation: Observation
+    reward: Array
+    """(B, open)"""
+    terminated: Array
+    """(B,) the episode ended for a reason inside the game"""
+    truncated: Array
+    """(B,) the clock ended it"""
+    terms: dict[str, Array]
+    """Reward terms by name, (B, open) each"""
+    sent: Array
+    """(B, open, 2) what acted: velocity as a fraction of top speed, ego frame"""
+    excess: Excess
+    """By how much what was asked exceeded the limits, (B, seats) each"""
+    cost: Array
+    """(B, open) the excesses in units of their limits, summed"""
+    success: Array
+    """(B, open) bool, latched for the episode"""
+    first_shot: Array
+    """(B,) bool: succeeded before a second distinct touch"""
+    final_observation: Observation | None = None
+    """Observations at the end of the episodes that ended, rows of all others stale;
+    None if none ended or worlds do not restart by themselves"""
+
+
+@dataclass
+class Episode:
+    """Counters of the running episodes, (B, ...) each."""
+
+    number: Array
+    """Episodes begun since the last seed"""
+    cycles: Array
+    """Control steps taken"""
+    returns: Array
+    """(B, seats) sum of rewards"""
+    success: Array
+    """(B, seats) latched"""
+    first_shot: Array
+    """(B,) latched"""
+    physics: dict[str, Array] = field(default_factory=dict)
+    """Physical parameters, (B,) each"""

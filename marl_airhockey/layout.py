@@ -1,0 +1,161 @@
+"""How observations are laid out: columns with bounds, ego frames, pieces side by side.
+
+Vectors are in the seat's ego frame, SI units.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.cast import Cast
+from marl_airhockey.physics import unknown
+from marl_airhockey.state import Array, Memory, State
+
+OBSERVE = ("velocity", "history", "pixels")
+"""What is shown of a puck: position and velocity; the last five sensed positions with a
+visibility flag, as a camera gives them; or pictures."""
+HISTORY = 5
+FRAMES = 3
+
+
+class Column(NamedTuple):
+    """One element of an observation.
+
+    ``(value - centre) / unit`` is of order one: the fixed scaling for a network.
+    """
+
+    label: str
+    low: float
+    high: float
+    unit: float
+    centre: float = 0.0
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What pieces need to know to state their columns."""
+
+    cast: Cast
+    observe: str
+    top_speed: float
+
+    @cached_property
+    def extent(self) -> Array:
+        """(2,) largest |x| and |y| of the table in any seat's ego frame, m."""
+        corners = np.asarray(self.cast.table.vertices)
+        turned = [corners @ r.T for r in self.rotations]
+        return np.asarray(np.max(np.abs(turned), axis=(0, 1)))
+
+    @cached_property
+    def rotations(self) -> Array:
+        """(S, 2, 2) from the table frame to each seat's ego frame."""
+        return np.array([self.cast.table.rotation(s.side) for s in self.cast.seats])
+
+    @cached_property
+    def straight(self) -> bool:
+        """True if there is one seat and its ego frame is the table frame."""
+        return len(self.rotations) == 1 and bool(self.rotations[0, 0, 0] == 1.0)
+
+    def place(
+        self, name: str, unit: tuple[float, float], x: float = 0.0
+    ) -> list[Column]:
+        """Columns of a position, centred at (x, 0)."""
+        ex, ey = self.extent
+        return [
+            Column(f"{name}.x", -ex, ex, unit[0], x),
+            Column(f"{name}.y", -ey, ey, unit[1]),
+        ]
+
+    def gap(self, name: str, unit: tuple[float, float]) -> list[Column]:
+        """Columns of the way from one position to another."""
+        ex, ey = 2 * self.extent
+        return [
+            Column(f"{name}.dx", -ex, ex, unit[0]),
+            Column(f"{name}.dy", -ey, ey, unit[1]),
+        ]
+
+    def motion(self, name: str, most: float, unit: float) -> list[Column]:
+        """Columns of a velocity."""
+        return [Column(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
+
+
+class Ego:
+    """A sensed state and the scenario's memory, seen from every seat."""
+
+    def __init__(self, state: State, memory: Memory, history: Array, scope: Scope):
+        self.state, self.memory, self.scope = state, memory, scope
+        self.history = history
+        """(..., HISTORY, pucks, 3) sensed positions and visibility, newest last"""
+        self.own = self._own(state.paddle)
+        """(..., S, 2) each seat's own paddle, m"""
+        self.own_velocity = self._own(state.paddle_velocity)
+        """(..., S, 2) m/s"""
+        self.puck = self.turn(state.puck)
+        """(..., S, pucks, 2) m"""
+        self.puck_velocity = self.turn(state.puck_velocity)
+        """(..., S, pucks, 2) m/s"""
+
+    def turn(self, vectors: Array) -> Array:
+        """(..., n, 2) vectors of the table frame to (..., S, n, 2) in ego frames."""
+        seats = vectors[..., None, :, :]
+        if self.scope.straight:
+            return seats
+        return np.asarray(seats @ self.scope.rotations.swapaxes(-1, -2))
+
+    def _own(self, vectors: Array) -> Array:
+        if self.scope.straight:
+            return vectors
+        seats = np.arange(vectors.shape[-2])
+        return np.asarray(self.turn(vectors)[..., seats, seats, :])
+
+
+class Piece(ABC):
+    """A part of an observation."""
+
+    goal: bool = False
+    """True for the wanted goal, which goals="dict" shows apart."""
+
+    @abstractmethod
+    def columns(self, scope: Scope) -> list[Column]:
+        """One column for each number."""
+
+    @abstractmethod
+    def write(self, ego: Ego, out: Array) -> None:
+        """Put the numbers into ``out`` (..., S, columns)."""
+
+
+class Layout:
+    """The pieces of an observation side by side: bounds, labels, and how to read it."""
+
+    def __init__(self, pieces: tuple[Piece, ...], scope: Scope) -> None:
+        if scope.observe not in OBSERVE:
+            raise ValueError(unknown("observe", scope.observe, OBSERVE))
+        self.scope = scope
+        columns = [piece.columns(scope) for piece in pieces]
+        ends = np.cumsum([len(c) for c in columns]).tolist()
+        starts = [0, *ends[:-1]]
+        self._parts = [
+            (piece, slice(a, b))
+            for piece, a, b in zip(pieces, starts, ends, strict=True)
+        ]
+        flat = [column for part in columns for column in part]
+        self.labels = tuple(column.label for column in flat)
+        self.low = np.array([c.low for c in flat], np.float32)
+        self.high = np.array([c.high for c in flat], np.float32)
+        self.unit = np.array([c.unit for c in flat], np.float32)
+        self.centre = np.array([c.centre for c in flat], np.float32)
+
+    def read(self, ego: Ego) -> Array:
+        """(..., S, columns) float32, inside the bounds."""
+        seats = len(self.scope.cast.seats)
+        shape = (*ego.state.time.shape, seats, len(self.labels))
+        out = np.empty(shape, np.float32)
+        for piece, part in self._parts:
+            piece.write(ego, out[..., part])
+        np.maximum(out, self.low, out=out)
+        return np.minimum(out, self.high, out=out)

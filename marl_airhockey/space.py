@@ -1,0 +1,331 @@
+"""One world on pymunk: paddles, pucks, blocks, walls and mouths in a space.
+
+Velocities inside a space are those half a substep ahead (leapfrog), so that a falling
+puck follows its parabola exactly; `kick` is what the backend adds when it reports them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pymunk
+from pymunk._chipmunk_cffi import lib
+
+from marl_airhockey.cast import Cast
+from marl_airhockey.chipmunk import EVENT, SUBSTEP, Reader, address
+from marl_airhockey.paddles import meet
+from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
+from marl_airhockey.rails import Rails
+from marl_airhockey.state import Array
+from marl_airhockey.table import GRAVITY
+
+PADDLE, PUCK, WALL, MOUTH, BLOCK = 1, 2, 3, 4, 5
+"""Collision types."""
+THICK = 0.5
+"""m: a wall this thick is never passed between two substeps."""
+POCKET = 100.0
+"""m: pucks out of play wait here, far from everything."""
+
+
+class Space:
+    """One world: a pymunk space with paddles, pucks, blocks, walls and mouths.
+
+    Args:
+        cast: who is on the table.
+        control_dt: s.
+        substeps: physics steps in a control step.
+        flags: (2,) this world's row of `chipmunk.new_flags`.
+    """
+
+    def __init__(
+        self, cast: Cast, control_dt: float, substeps: int, flags: Array
+    ) -> None:
+        self.cast, self.control_dt, self.substeps = cast, control_dt, substeps
+        self.flags = flags
+        self.sim_dt = control_dt / substeps
+        self.space = space = pymunk.Space()
+        # Overlap goes at once; contacts rest with a tenth of a millimetre of it.
+        space.collision_slop, space.collision_bias = 1e-4, 0.0
+        self._out: dict[int, tuple[float, float]] = {}
+        bodies = cast.bodies
+        pairs = (bodies.paddles, bodies.pucks)
+        self.touched = np.zeros(pairs, np.int64)
+        self.touched_at = np.full(pairs, np.nan)
+        self.touching = np.zeros(pairs, np.bool_)
+        self.crossed = np.zeros((bodies.pucks, len(cast.mouths)), np.bool_)
+        self.crossed_velocity = np.zeros((*self.crossed.shape, 2))
+        self._shapes: dict[pymunk.Shape, int] = {}
+        self._rails = Rails(cast)
+        self._build_bodies()
+        self._build_walls()
+        space.on_collision(PADDLE, PUCK, begin=self._touch, separate=self._part)
+        space.on_collision(PUCK, MOUTH, begin=self._cross)
+        self._read = Reader(space, len(self.bodies))
+        self._space = space._space
+        self._raw = [body._body for body in self.bodies]
+        self._loose = [s._shape for body in self.bodies for s in body.shapes]
+        self.set_physics({name: p.default for name, p in PARAMETERS.items()})
+
+    def _build_bodies(self) -> None:
+        cast, space = self.cast, self.space
+        self.bodies: list[pymunk.Body] = []
+        self.paddles: list[pymunk.Shape] = []
+        self.blocks: list[pymunk.Shape] = []
+        self._grips: list[pymunk.Constraint] = []
+        for i in range(len(cast.seats)):
+            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+            disc = pymunk.Circle(body, cast.table.paddle_radius)
+            self.paddles.append(self._add(body, disc, PADDLE, i))
+        for i in range(cast.pucks):
+            body = pymunk.Body(1.0, float("inf"))
+            disc = pymunk.Circle(body, cast.table.puck_radius)
+            self._add(body, disc, PUCK, i).elasticity = 1.0
+        for i in range(cast.blocks):
+            body = pymunk.Body(1.0, float("inf"))
+            size = 2 * cast.block_radius
+            shape: pymunk.Shape
+            if cast.block_shape == "disc":
+                shape = pymunk.Circle(body, cast.block_radius)
+            else:
+                shape = pymunk.Poly.create_box(body, (size, size))
+            self.blocks.append(self._add(body, shape, BLOCK, i))
+            # Coulomb friction on the table: joints that hold up to a largest force.
+            grip = pymunk.PivotJoint(space.static_body, body, (0, 0), (0, 0))
+            twist = pymunk.GearJoint(space.static_body, body, 0.0, 1.0)
+            for joint in (grip, twist):
+                joint.max_bias = 0.0
+                space.add(joint)
+                self._grips.append(joint)
+
+    def _add(
+        self, body: pymunk.Body, shape: pymunk.Shape, kind: int, index: int
+    ) -> pymunk.Shape:
+        shape.collision_type, shape.friction = kind, 0.0
+        self.space.add(body, shape)
+        self.bodies.append(body)
+        self._shapes[shape] = index
+        return shape
+
+    def _build_walls(self) -> None:
+        """Boxes behind every side, with a gap and a sensor in it for a goal mouth."""
+        cast, static = self.cast, self.space.static_body
+        self.walls: list[pymunk.Shape] = []
+        for side in range(len(cast.table.vertices)):
+            start, end = cast.table.ends(side)
+            along = (end - start) / np.linalg.norm(end - start)
+            out = -cast.table.normals[side] * THICK
+            mouths = [m for m in cast.mouths if m.side == side]
+            gaps = [m for m in mouths if m.width is not None]
+            cuts = [start - along * THICK]
+            for mouth in gaps:
+                middle, half = (start + end) / 2, along * (mouth.width or 0.0) / 2
+                cuts += [middle - half, middle + half]
+                # The sensor begins a radius behind the line: the centre has passed.
+                depth = out / THICK * cast.table.puck_radius
+                box = [middle - half + depth, middle + half + depth]
+                sensor = self._box(static, box[0], box[1], out)
+                sensor.sensor, sensor.collision_type = True, MOUTH
+                self._shapes[sensor] = cast.mouths.index(mouth)
+                self.space.add(sensor)
+            cuts.append(end + along * THICK)
+            for a, b in zip(cuts[::2], cuts[1::2], strict=True):
+                wall = self._box(static, a, b, out)
+                wall.collision_type = WALL
+                for mouth in mouths:
+                    if mouth.width is None:
+                        wall.collision_type = MOUTH
+                        self._shapes[wall] = cast.mouths.index(mouth)
+                self.walls.append(wall)
+                self.space.add(wall)
+        for obstacle in cast.obstacles:
+            tip = obstacle.end or obstacle.start
+            shape = pymunk.Segment(static, obstacle.start, tip, obstacle.radius)
+            shape.friction, shape.collision_type = 0.0, WALL
+            self.walls.append(shape)
+            self.space.add(shape)
+
+    @staticmethod
+    def _box(static: pymunk.Body, a: Array, b: Array, out: Array) -> pymunk.Poly:
+        corners = [(float(x), float(y)) for x, y in (a, b, b + out, a + out)]
+        box = pymunk.Poly(static, corners)
+        box.friction = 0.0
+        return box
+
+    def read(self) -> Array:
+        """(movers, 4) x, y, vx, vy of every body; the same memory at every call."""
+        return self._read()
+
+    def _touch(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        paddle, puck = arbiter.shapes
+        pair = self._shapes[paddle], self._shapes[puck]
+        self.touched[pair] += 1
+        self.touched_at[pair] = (self.flags[SUBSTEP] + 1) * self.sim_dt
+        self.touching[pair] = True
+        self.flags[EVENT] = 1
+
+    def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        paddle, puck = arbiter.shapes
+        self.touching[self._shapes[paddle], self._shapes[puck]] = False
+
+    def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        puck, mouth = arbiter.shapes
+        pair = self._shapes[puck], self._shapes[mouth]
+        body = self.bodies[self.cast.bodies.puck.start + pair[0]]
+        if pair[0] in self._out:
+            return
+        self.crossed[pair] = True
+        self.crossed_velocity[pair] = body.velocity
+        self.flags[EVENT] = 1
+        if mouth.sensor:
+            self._out[pair[0]] = body.position
+
+    def set_physics(self, values: dict[str, float]) -> None:
+        """Set the parameters of this world, by name."""
+        pull = GRAVITY * np.sin(np.radians(values["tilt"]))
+        self.space.gravity = (-float(pull), 0.0)
+        self.space.damping = float(np.exp(-values["puck_damping"]))
+        self.kick = 0.5 * self.sim_dt * float(pull)
+        for wall in self.walls:
+            wall.elasticity = values["wall_restitution"]
+        for paddle in self.paddles:
+            paddle.elasticity = values["paddle_restitution"]
+        for body in self.bodies[self.cast.bodies.puck]:
+            body.mass = values["puck_mass"]
+        mass, grip = values["block_mass"], values["block_friction"]
+        half = self.cast.block_radius
+        bodies = self.bodies[self.cast.bodies.block]
+        for i, (body, shape) in enumerate(zip(bodies, self.blocks, strict=True)):
+            shape.elasticity = values["block_restitution"]
+            body.mass = mass
+            self._grips[2 * i].max_force = mass * grip
+            # The mean distance of a square's points from its centre is 0.765 halves.
+            self._grips[2 * i + 1].max_force = mass * grip * 0.765 * half
+            if self.cast.block_shape == "square":
+                body.moment = mass * (2 * half) ** 2 / 6
+
+    def start(self, position: Array, velocity: Array, angle: Array) -> None:
+        """Put every mover (movers, 2) at a place with a velocity; forget all contacts.
+
+        Shapes are added anew in their order, so that no contact of the last episode
+        lives on in Chipmunk's caches and the same start gives the same episode.
+        """
+        # Through the library, as pymunk's bookkeeping of what is added stays the same.
+        for shape in self._loose:
+            lib.cpSpaceRemoveShape(self._space, shape)
+        for shape in self._loose:
+            lib.cpSpaceAddShape(self._space, shape)
+        pucks = self.cast.bodies.puck
+        for i, body in enumerate(self.bodies):
+            x, y = position[i].tolist()
+            vx, vy = velocity[i].tolist()
+            body.position = (x, y)
+            body.velocity = (vx - self.kick * (pucks.start <= i < pucks.stop), vy)
+            if i >= pucks.stop:
+                body.angle, body.angular_velocity = float(angle[i]), 0.0
+            lib.cpSpaceReindexShapesForBody(self._space, body._body)
+        self._out.clear()
+        self.touching[:] = False
+        self.flags[EVENT] = 1
+
+    def step(
+        self,
+        position: Array,
+        velocity: Array,
+        goal: Array,
+        told: Array,
+        path: Array | None,
+    ) -> None:
+        """Move by ``control_dt``, or by what `chipmunk.drift` has left of it.
+
+        Args:
+            position: (paddles, 2) now, m; changed in place.
+            velocity: (paddles, 2) now, m/s; changed in place.
+            goal: (paddles, 2) velocity at the end of the step, m/s.
+            told: (paddles,) bool: moves at ``goal`` all the time and does not yield.
+            path: (substeps + 1, movers, 4) to be filled, or None.
+        """
+        n, flags, first = self.substeps, self.flags, int(self.flags[SUBSTEP]) + 1
+        set_velocity, advance = lib.cpBodySetVelocity, lib.cpSpaceStep
+        if path is not None:
+            path[0] = self.read()
+        velocity[told] = goal[told]
+        ramp = (goal - velocity) / n
+        alone = len(position) == 1
+        (rx, ry), (x, y) = ramp[0].tolist(), (velocity[0] + 0.5 * ramp[0]).tolist()
+        if first:
+            self._settle()
+        for k in range(first, n):
+            flags[SUBSTEP] = k
+            if alone:
+                set_velocity(self._raw[0], (x + k * rx, y + k * ry))
+            else:
+                self._drive(position, velocity, ramp, told)
+            advance(self._space, self.sim_dt)
+            if flags[EVENT]:
+                self._settle()
+            if path is not None:
+                path[k + 1] = self.read()
+        if alone:
+            velocity[0] = goal[0]
+
+    def begin(self) -> None:
+        """Forget the events of the last step."""
+        self.touched[:] = 0
+        self.touched_at[:] = np.nan
+        self.crossed[:] = False
+        for k in self._out:
+            self._park(k)
+        self.flags[EVENT] = bool(self._out) or bool(self.touching.any())
+
+    def _drive(
+        self, position: Array, velocity: Array, ramp: Array, told: Array
+    ) -> None:
+        """Move several paddles by a substep, letting them meet."""
+        mean = velocity + 0.5 * ramp
+        position += mean * self.sim_dt
+        velocity += ramp
+        met = meet(position, velocity, told, 2 * self.cast.table.paddle_radius)
+        for i, body in enumerate(self._raw[: len(position)]):
+            speed = velocity[i] if met else mean[i]
+            lib.cpBodySetVelocity(body, tuple(speed.tolist()))
+            if met:
+                back = position[i] - speed * self.sim_dt
+                lib.cpBodySetPosition(body, tuple(back.tolist()))
+
+    def _settle(self) -> None:
+        """After a contact: no puck in a wall, above the cap, or in a mouth in play."""
+        first = self.cast.bodies.puck.start
+        for k, body in enumerate(self._raw[self.cast.bodies.puck]):
+            if k in self._out:
+                self._park(k)
+                continue
+            v = lib.cpBodyGetVelocity(body)
+            vx, vy = v.x + self.kick, v.y
+            speed2 = vx * vx + vy * vy
+            if speed2 > PUCK_SPEED_CAP**2:
+                share = PUCK_SPEED_CAP / speed2**0.5
+                lib.cpBodySetVelocity(body, (vx * share - self.kick, vy * share))
+            puck = self.bodies[first + k]
+            (x, y), paddles = puck.position, self.bodies[self.cast.bodies.paddle]
+            free = self._rails.slip(x, y, [b.position for b in paddles])
+            if free is not None:
+                puck.position = free
+
+    def _park(self, puck: int) -> None:
+        body = self._raw[self.cast.bodies.puck.start + puck]
+        lib.cpBodySetPosition(body, (POCKET * (1 + puck), POCKET))
+        lib.cpBodySetVelocity(body, (0.0, 0.0))
+
+    def lift(self, paddle: int, up: bool) -> None:
+        """Take a paddle off the table, or put it back: a lifted one touches nothing."""
+        mask = 0 if up else pymunk.ShapeFilter.ALL_MASKS()
+        self.paddles[paddle].filter = pymunk.ShapeFilter(mask=mask)
+
+    @property
+    def pointers(self) -> tuple[int, int]:
+        """Addresses of the space and of the first paddle's body."""
+        return address(self._space), address(self._raw[0])
+
+    @property
+    def out(self) -> dict[int, tuple[float, float]]:
+        """Pucks out of play and where they went, m."""
+        return self._out
