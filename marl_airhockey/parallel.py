@@ -34,7 +34,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     All agents stay to the end of the episode and end together. ``info`` of an agent
     holds ``reward`` (terms by name), ``sent`` (what acted, as an action), ``success``
     (latched), ``constraints`` and ``cost`` (by how much what was asked exceeded the
-    limits), ``touches`` and ``physics``.
+    limits); that of a reset holds the ``physics`` of the episode.
 
     Args:
         scenario: its name, or a scenario object.

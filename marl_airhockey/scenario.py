@@ -7,7 +7,7 @@ and a stored dataset. Leading axes are the caller's.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import ClassVar, Literal, NamedTuple
 
@@ -83,8 +83,10 @@ class Scenario(ABC):
             raise ValueError(unknown("table", self.table, TABLES))
         if self.goals not in ("flat", "dict"):
             raise ValueError(unknown("form of goals", self.goals, ("flat", "dict")))
-        if not self.seconds > 0:
-            raise ValueError(f"seconds: {self.seconds} must be above 0")
+        for f in fields(self):
+            _check_number(f.name, f.type, getattr(self, f.name))
+        if self.seconds == 0:
+            raise ValueError("seconds: must be above 0")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
             raise ValueError('goals="dict": this scenario has no wanted goal')
 
@@ -209,6 +211,24 @@ class Scenario(ABC):
             after = states.map(lambda x, t=t: x[t + 1])  # type: ignore[misc]
             all_of.append(self.advance(all_of[-1], before, sent[t], after))
         return {name: np.stack([m[name] for m in all_of]) for name in memory}
+
+
+def _check_number(name: str, kind: object, value: object) -> None:
+    """Refuse what is no sane number where a field holds one."""
+    if kind not in ("int", "float"):
+        return
+    if isinstance(value, (tuple, list)):
+        raise ValueError(
+            f"{name}: {value!r} is a range; rules and geometry are fixed when built, "
+            "only physics can be drawn per episode"
+        )
+    whole = kind == "int"
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{name}: expected a number, got {value!r}")
+    least = 1 if whole else 0
+    if not (np.isfinite(value) and value >= least) or (whole and value != int(value)):
+        words = "a whole number of at least 1" if whole else "a number of at least 0"
+        raise ValueError(f"{name}: {value!r} must be {words}")
 
 
 class GoalScenario(Scenario):
