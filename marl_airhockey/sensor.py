@@ -98,8 +98,8 @@ class Sensor:
             values: physical parameters, (B,) each.
             draws: the sensor's streams.
         """
-        position, velocity = (x[mask, self.camera] for x in _motion(state))
         if not self.ideal:
+            position, velocity = (x[mask, self.camera] for x in _motion(state))
             ago = np.arange(self.delay.depth, 0, -1)[:, None, None] * self.control_dt
             self.delay.fill(mask, position[:, None] - velocity[:, None] * ago)
             late = values["observation_delay"][mask] + self.control_dt

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -231,9 +232,7 @@ class World:
         episode = self.episode
         episode.cycles += 1
         truncated = (episode.cycles >= self.max_cycles) & ~terminated
-        reward = np.zeros(episode.returns.shape)
-        for term in terms.values():
-            reward += term
+        reward = np.asarray(reduce(np.add, terms.values()))
         episode.returns += reward
         success = self.scenario.succeeds(self.state, self.memory)
         if success.ndim == 1:

@@ -43,7 +43,8 @@ class Pymunk(Backend):
             self._kicks[i] = self.spaces[i].kick
 
     def start(self, state: State, mask: Array) -> None:
-        self.state = self.state.scatter(mask, state)
+        everywhere = len(state.time) == self.num_worlds
+        self.state = state if everywhere else self.state.scatter(mask, state)
         for row, i in enumerate(np.flatnonzero(mask)):
             position, velocity = state.position[row], state.velocity[row]
             self.spaces[i].start(position, velocity, state.angle[row])
