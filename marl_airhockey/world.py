@@ -191,6 +191,8 @@ class World:
             values["paddle_acceleration"],
             self.control_dt,
         )
+        if told is not None:
+            np.copyto(sent, told[..., 2:], where=np.isfinite(told[..., 2:]))
         self.sent = sent
         after = self.backend.step(Command(sent, told))
         self._pushed = (sent - before.paddle_velocity) / self.control_dt

@@ -104,6 +104,7 @@ def test_a_told_paddle_follows_its_driver():
     world = ah.make_world(Pair(), 1, drivers={"paddle_1": Hand()})
     world.reset(0)
     world.step(np.zeros((1, 1, 2)))
+    np.testing.assert_allclose(world.sent[0, 1], [-0.2, 0.0], atol=1e-12)
     # Told in the ego frame of the far seat: half a turn from the table's.
     np.testing.assert_allclose(world.state.paddle[0, 1], [0.5, -0.1], atol=1e-12)
     np.testing.assert_allclose(
