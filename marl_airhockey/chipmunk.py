@@ -38,39 +38,66 @@ _set_velocity = _function("cpBodySetVelocity", ctypes.c_double, ctypes.c_double)
 _advance = _function("cpSpaceStep", ctypes.c_double)
 
 
+_each = _function("cpSpaceEachBody", ctypes.c_void_p, ctypes.c_void_p)
+_gather = address(ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched"))
+_libc = ctypes.CDLL(None if os.name == "posix" else "msvcrt")
+_copy = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)(
+    ctypes.cast(_libc.memcpy, ctypes.c_void_p).value or 0
+)
+_zero = np.zeros(1, np.int64)
+_nothing = _zero.ctypes.data
+
+
 @njit(cache=False)
 def drift(
-    spaces: Array,
-    paddles: Array,
+    worlds: Array,
     velocity: Array,
     goal: Array,
-    substeps: int,
     dt: float,
+    substeps: int,
     flags: Array,
+    ways: Array,
 ) -> None:
     """Step quiet worlds with one paddle each until the end or the first event.
 
     Args:
-        spaces: (B,) addresses of the spaces.
-        paddles: (B,) addresses of the paddles' bodies.
+        worlds: (B, 5) addresses: the space, its paddle's body, and its `Reader`'s.
         velocity: (B, 2) at the start, m/s.
         goal: (B, 2) at the end, m/s; the ramp between them is linear.
-        substeps: physics steps in the control step.
         dt: of a substep, s.
+        substeps: physics steps in the control step.
         flags: (B, 2) EVENT, set by callbacks, and SUBSTEP. A world whose EVENT is set
             before is left alone, with SUBSTEP -1.
+        ways: (B, substeps + 1, movers, 4) filled with x, y, vx, vy at every substep, or
+            (B, 1, movers, 4) with those at the end. What an event ends is not filled.
     """
-    for b in range(len(spaces)):
+    every = ways.shape[1] > 1
+    for b in range(len(worlds)):
+        flags[b, SUBSTEP] = -1
+        if flags[b, EVENT]:
+            continue
         rx = (goal[b, 0] - velocity[b, 0]) / substeps
         ry = (goal[b, 1] - velocity[b, 1]) / substeps
         x, y = velocity[b, 0] + 0.5 * rx, velocity[b, 1] + 0.5 * ry
-        flags[b, SUBSTEP] = -1
+        if every:
+            _record(worlds[b], ways[b, 0])
         for k in range(substeps):
+            flags[b, SUBSTEP] = k
+            _set_velocity(worlds[b, 1], x + k * rx, y + k * ry)
+            _advance(worlds[b, 0], dt)
             if flags[b, EVENT]:
                 break
-            flags[b, SUBSTEP] = k
-            _set_velocity(paddles[b], x + k * rx, y + k * ry)
-            _advance(spaces[b], dt)
+            if every:
+                _record(worlds[b], ways[b, k + 1])
+        if not every and not flags[b, EVENT]:
+            _record(worlds[b], ways[b, 0])
+
+
+@njit(cache=False)
+def _record(world: Array, rows: Array) -> None:
+    _copy(world[3], _nothing, 4)
+    _each(world[0], _gather, world[2])
+    _copy(rows.ctypes.data, world[4], rows.size * 8)
 
 
 class Reader:
@@ -92,6 +119,13 @@ class Reader:
         flat = np.frombuffer(self._buffer.float_buf(), dtype=np.float64)
         self._rows = flat.reshape(-1, 4)[:bodies]
         self._space = space._space
+        array = self._buffer._float_arr
+        self.addresses = (
+            address(self._data),
+            address(ffi.addressof(array[0], "num")),
+            address(array.arr),
+        )
+        """Of the struct, of its count of numbers, and of the numbers."""
 
     def __call__(self) -> Array:
         """(bodies, 4) x, y, vx, vy; the same memory at every call."""

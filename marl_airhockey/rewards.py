@@ -37,18 +37,20 @@ def no_touches(worlds: int, paddles: int, pucks: int) -> Memory:
     return {
         "touches": np.zeros((worlds, paddles, pucks), np.int64),
         "apart": np.full((worlds, paddles, pucks), np.inf),
+        "met": np.zeros(worlds, np.bool_),
     }
 
 
 def count_touches(memory: Memory, before: State, after: State) -> Memory:
     """Count distinct touches: ``touches`` and ``apart`` (..., paddles, pucks).
 
-    ``apart`` is the time in seconds since the last contact ended, 0 while in contact. A
-    puck cradled against the paddle earns a single touch.
+    ``apart`` is the time in seconds since the last contact ended, 0 while in contact;
+    ``met`` (...) whether there was any touch yet. A puck cradled against the paddle
+    earns a single touch.
     """
     dt = (after.time - before.time)[..., None, None]
     if not after.contact:
-        return {"touches": memory["touches"], "apart": memory["apart"] + dt}
+        return {**memory, "apart": memory["apart"] + dt}
     began = after.touched > 0
     at = np.where(began, after.touched_at, 0.0)
     distinct = began & (memory["apart"] + at >= TOUCH_GAP)
@@ -56,12 +58,13 @@ def count_touches(memory: Memory, before: State, after: State) -> Memory:
     return {
         "touches": memory["touches"] + distinct,
         "apart": np.where(after.touching, 0.0, apart),
+        "met": memory["met"] | distinct.any((-1, -2)),
     }
 
 
 def touched(memory: Memory) -> Array:
     """(...) bool: any paddle has touched any puck in this episode."""
-    return np.asarray((memory["touches"] > 0).any((-1, -2)))
+    return memory["met"]
 
 
 def nearest(memory: Memory, after: State) -> Array:

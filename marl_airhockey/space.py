@@ -245,14 +245,14 @@ class Space:
         """
         n, flags, first = self.substeps, self.flags, int(self.flags[SUBSTEP]) + 1
         set_velocity, advance = lib.cpBodySetVelocity, lib.cpSpaceStep
-        if path is not None:
-            path[0] = self.read()
         velocity[told] = goal[told]
         ramp = (goal - velocity) / n
         alone = len(position) == 1
         (rx, ry), (x, y) = ramp[0].tolist(), (velocity[0] + 0.5 * ramp[0]).tolist()
         if first:
             self._settle()
+        if path is not None:
+            path[first] = self.read()
         for k in range(first, n):
             flags[SUBSTEP] = k
             if alone:
@@ -321,9 +321,9 @@ class Space:
         self.paddles[paddle].filter = pymunk.ShapeFilter(mask=mask)
 
     @property
-    def pointers(self) -> tuple[int, int]:
-        """Addresses of the space and of the first paddle's body."""
-        return address(self._space), address(self._raw[0])
+    def addresses(self) -> tuple[int, ...]:
+        """What `chipmunk.drift` needs: the space, the first paddle, the reader."""
+        return address(self._space), address(self._raw[0]), *self._read.addresses
 
     @property
     def out(self) -> dict[int, tuple[float, float]]:

@@ -42,23 +42,34 @@ class Reach(GoalScenario):
         goal = starts.redraw(
             draws, sample, lambda rows: length(rows - paddle) >= self.far
         )
-        return state, {"goal": goal, "was": paddle.copy(), "here": paddle.copy()}
+        return state, {
+            "goal": goal,
+            "was": paddle.copy(),
+            "here": paddle.copy(),
+            "gap": length(paddle - goal),
+            "held": np.zeros(worlds, np.int64),
+        }
 
     def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
-        return {"was": before.paddle[..., 0, :], "here": after.paddle[..., 0, :]}
+        here = after.paddle[..., 0, :]
+        gap = length(here - memory["goal"])
+        return {
+            "was": before.paddle[..., 0, :],
+            "here": here,
+            "gap": gap,
+            "held": np.where(gap < self.radius, memory["held"] + 1, 0),
+        }
 
     observation = (views.Own(), views.Goal((0.2, 0.2), -0.55, "own"))
 
     def reward_terms(
         self, before: State, sent: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
-        gap = length(before.paddle - old["goal"][..., None, :])
-        progress = gap - length(after.paddle - old["goal"][..., None, :])
         return {
-            "progress": 2.0 * progress,
-            "time": np.full(progress.shape, -0.02),
+            "progress": 2.0 * (old["gap"] - new["gap"])[..., None],
+            "time": np.full((*after.time.shape, 1), -0.02),
             "success": 2.0 * self.success(after, new)[..., None],
         }
 
@@ -66,7 +77,7 @@ class Reach(GoalScenario):
         return self.success(after, memory)
 
     def success(self, after: State, memory: Memory) -> Array:
-        return self.met(after, memory)
+        return np.asarray(memory["held"] >= 2)
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

@@ -50,6 +50,7 @@ class ReachVelocity(GoalScenario):
             "goal_velocity": velocity,
             "gap": gap,
             "score": np.zeros(worlds),
+            "passed": np.zeros(worlds, np.bool_),
         }
 
     def remember(
@@ -61,6 +62,7 @@ class ReachVelocity(GoalScenario):
         return {
             "gap": np.minimum(memory["gap"], gap),
             "score": np.maximum(memory["score"], score),
+            "passed": (gap < self.radius) & (error < self.error),
         }
 
     observation = (
@@ -83,7 +85,7 @@ class ReachVelocity(GoalScenario):
         return self.success(after, memory)
 
     def success(self, after: State, memory: Memory) -> Array:
-        return self.met(after, memory)
+        return memory["passed"]
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

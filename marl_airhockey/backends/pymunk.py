@@ -26,12 +26,12 @@ class Pymunk(Backend):
         super().__init__(cast, num_worlds, control_dt, substeps)
         self._flags = new_flags(num_worlds)
         self.spaces = [Space(cast, control_dt, substeps, row) for row in self._flags]
-        self._pointers = np.array([space.pointers for space in self.spaces], np.int64).T
-        self._drifts = AVAILABLE and len(cast.seats) == 1 and not cast.path
+        self._worlds = np.array([s.addresses for s in self.spaces], np.int64)
+        self._drifts = AVAILABLE and len(cast.seats) == 1
         mouths = len(cast.mouths)
         self.state = still_state(cast.bodies, num_worlds, mouths)
         self._steps = np.zeros(num_worlds, np.int64)
-        self._kicks = np.zeros((num_worlds, 1))
+        self._kicks = np.zeros((num_worlds, 1, 1))
         self._never = np.zeros((num_worlds, len(cast.seats)), np.bool_)
         self._quiet = still_state(cast.bodies, num_worlds, mouths)
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
@@ -57,25 +57,19 @@ class Pymunk(Backend):
         goal, told, lifted = command.velocity, self._never, None
         if command.told is not None:
             goal, told, lifted = self._follow(position, command.told, goal)
-        rows = np.empty((self.num_worlds, bodies.movers, 4))
-        path = None
-        if self.cast.path:
-            shape = (self.num_worlds, self.substeps + 1, bodies.movers, 4)
-            path = np.empty(shape)
+        moments = self.substeps + 1 if self.cast.path else 1
+        ways = np.empty((self.num_worlds, moments, bodies.movers, 4))
+        path, rows = ways if self.cast.path else None, ways[:, -1]
         flags = self._flags
         for i in flags[:, EVENT].nonzero()[0].tolist():
             self.spaces[i].begin()
-        left = self._drift(velocity, goal, lifted is not None)
-        for i in left:
-            way = None if path is None else path[i]
-            self.spaces[i].step(position[i], velocity[i], goal[i], told[i], way)
-        for i, space in enumerate(self.spaces):
+        for i in self._drift(velocity, goal, lifted is not None, ways):
+            way, space = None if path is None else path[i], self.spaces[i]
+            space.step(position[i], velocity[i], goal[i], told[i], way)
             rows[i] = space.read()
         eventful = flags[:, EVENT].nonzero()[0].tolist()
         rows[:, :s, 2:] = velocity
-        rows[:, bodies.puck, 2] += self._kicks
-        if path is not None:
-            path[:, :, bodies.puck, 2] += self._kicks[:, None]
+        ways[:, :, bodies.puck, 2] += self._kicks
         self._steps += 1
         place, speed = rows[..., :2], rows[..., 2:]
         if len(bodies) > bodies.movers:
@@ -93,7 +87,9 @@ class Pymunk(Backend):
         self.state = new
         return new
 
-    def _drift(self, velocity: Array, goal: Array, any_told: bool) -> list[int]:
+    def _drift(
+        self, velocity: Array, goal: Array, any_told: bool, ways: Array
+    ) -> list[int]:
         """Step the quiet worlds in compiled code; those that Python must finish."""
         flags = self._flags
         if not self._drifts or any_told:
@@ -101,8 +97,8 @@ class Pymunk(Backend):
             return list(range(self.num_worlds))
         sim_dt = self.control_dt / self.substeps
         start = velocity[:, 0].copy()
-        spaces, paddles = self._pointers
-        drift(spaces, paddles, start, goal[:, 0], self.substeps, sim_dt, flags)
+        end = goal[:, 0]
+        drift(self._worlds, start, end, sim_dt, self.substeps, flags, ways)
         left: list[int] = flags[:, EVENT].nonzero()[0].tolist()
         velocity[:, 0] = goal[:, 0]
         for i in left:
