@@ -79,6 +79,7 @@ def main(
     profile: Annotated[str, typer.Option(help="ideal or robot.")] = "ideal",
     jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/tasks"),
+    markdown: Annotated[Path | None, typer.Option(help="Write the table here.")] = None,
 ) -> None:
     """Train, judge, print."""
     names = tasks.split(",")
@@ -93,27 +94,43 @@ def main(
         for future in as_completed(waiting):
             rows.append(future.result())
             console.print_json(json.dumps(rows[-1]))
-    table = Table(title=f"{profile} profile, {seeds} seeds, {EPISODES} episodes each")
-    heads = ("task", "success", "worst", "sampled", "first shot", "CPU min", "M steps")
-    for head in (*heads, "s to 0.9", "still", "random", "sticky"):
-        table.add_column(head, justify="left" if head == "task" else "right")
-    for name in names:
-        mine = [row for row in rows if row["scenario"] == name]
-        success = [row["deterministic"] for row in mine]
-        late = [row["cpu_seconds_to_0.9"] for row in mine]
-        ground = floors(name, profile)
-        table.add_row(
-            name,
-            f"{np.mean(success):.3f}",
-            f"{min(success):.3f}",
-            f"{np.mean([row['sampled'] for row in mine]):.3f}",
-            f"{np.mean([row['first_shot'] for row in mine]):.3f}",
-            f"{np.mean([row['cpu_minutes'] for row in mine]):.1f}",
-            f"{np.mean([row['steps'] for row in mine]) / 1e6:.1f}",
-            "-" if None in late else f"{np.mean(late):.0f}",
-            *(f"{ground[k]:.3f}" for k in ("still", "random", "sticky")),
-        )
+    heads = ("task", "success", "worst seed", "sampled", "first shot", "CPU-min")
+    heads += ("M steps", "CPU-s to 0.9", "still", "random", "sticky")
+    lines = [
+        line(name, [row for row in rows if row["scenario"] == name], profile)
+        for name in names
+    ]
+    table = Table(
+        *heads, title=f"{profile} profile, {seeds} seeds, {EPISODES} episodes"
+    )
+    for cells in lines:
+        table.add_row(*cells)
     console.print(table)
+    if markdown is not None:
+        ruled = [heads, ("---",) * len(heads), *lines]
+        text = "".join(f"| {' | '.join(cells)} |\n" for cells in ruled)
+        markdown.write_text(text)
+
+
+def line(name: str, rows: list[dict[str, Any]], profile: str) -> tuple[str, ...]:
+    """The cells of a task: means over its seeds, and the floors."""
+
+    def mean(key: str) -> float:
+        return float(np.mean([row[key] for row in rows]))
+
+    late = [row["cpu_seconds_to_0.9"] for row in rows]
+    ground = floors(name, profile)
+    return (
+        name,
+        f"{mean('deterministic'):.3f}",
+        f"{min(row['deterministic'] for row in rows):.3f}",
+        f"{mean('sampled'):.3f}",
+        f"{mean('first_shot'):.3f}",
+        f"{mean('cpu_minutes'):.1f}",
+        f"{mean('steps') / 1e6:.1f}",
+        "-" if None in late else f"{np.mean(late):.0f}",
+        *(f"{ground[k]:.3f}" for k in ("still", "random", "sticky")),
+    )
 
 
 if __name__ == "__main__":
