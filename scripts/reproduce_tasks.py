@@ -94,8 +94,10 @@ def main(
         for future in as_completed(waiting):
             rows.append(future.result())
             console.print_json(json.dumps(rows[-1]))
-    heads = ("task", "success", "worst seed", "sampled", "first shot", "CPU-min")
-    heads += ("M steps", "CPU-s to 0.9", "still", "random", "sticky")
+    heads = (
+        *("task", "success", "worst seed", "sampled", "first shot", "CPU-min"),
+        *("M steps", "CPU-s to 0.9", "still", "random", "sticky"),
+    )
     lines = [
         line(name, [row for row in rows if row["scenario"] == name], profile)
         for name in names
