@@ -198,7 +198,8 @@ def result_table(results: list[Result]) -> Table:
         table.add_column(result.driver, justify="right")
     lines: dict[str, Callable[[Result], str]] = {
         "success": lambda r: f"{r.success:.3f}",
-        "95 % interval": lambda r: "..".join(f"{v:.3f}" for v in r.success_interval),
+        "95 % from": lambda r: f"{r.success_interval[0]:.3f}",
+        "95 % to": lambda r: f"{r.success_interval[1]:.3f}",
         "first-shot success": lambda r: f"{r.first_shot:.3f}",
         "return": lambda r: f"{r.returns:.2f}",
         "control steps": lambda r: f"{r.length:.0f}",

@@ -71,7 +71,10 @@ def build_world(
     """
     for name in keywords:
         if name not in Keywords.__annotations__:
-            raise ValueError(unknown("keyword", name, Keywords.__annotations__))
+            raise ValueError(
+                unknown("keyword", name, Keywords.__annotations__)
+                + "; fields of the scenario go into options={...}"
+            )
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
     game = _scenario(scenario, keywords)

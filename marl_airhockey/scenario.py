@@ -102,7 +102,11 @@ class Scenario(ABC):
     def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
-        """What changes in the memory by a step; touches are counted already."""
+        """What changes in the memory by a step.
+
+        ``memory`` holds the new touches already, all else as it was before the step. An
+        event that happens once needs a flag of its own, ``old | now``.
+        """
         return {}
 
     @property

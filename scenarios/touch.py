@@ -44,7 +44,7 @@ class Touch(Scenario):
         return {
             "approach": (old["gap"] - new["gap"])[..., None],
             "touch": 1.0 * (new["touches"] - old["touches"]).sum(-1),
-            "drop": -1.0 * self.terminated(after, new)[..., None],
+            "drop": -1.0 * after.crossed[..., 0, :1],
         }
 
     def terminated(self, after: State, memory: Memory) -> Array:
