@@ -87,15 +87,7 @@ def build_world(
     control_dt = keywords.get("control_dt", 0.05)
     substeps = keywords.get("substeps", kind.default_substeps)
     max_cycles = keywords.get("max_cycles")
-    if not 0.001 <= control_dt <= 1.0:
-        raise ValueError(f"control_dt: {control_dt} s must be in 0.001 .. 1")
-    if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
-        raise ValueError(
-            f"substeps: {substeps!r} must be a whole number above 0: control_dt is a "
-            "multiple of the simulation's step"
-        )
-    if max_cycles is not None and max_cycles < 1:
-        raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
+    _check_times(control_dt, substeps, max_cycles)
     profile = keywords.get("profile", "ideal")
     physics = Physics(cast.defaults, profile, keywords.get("physics"))
     usual = "history" if profile == "robot" else "velocity"
@@ -115,6 +107,18 @@ def build_world(
         max_cycles,
         autoreset,
     )
+
+
+def _check_times(control_dt: float, substeps: int, max_cycles: int | None) -> None:
+    if not 0.001 <= control_dt <= 1.0:
+        raise ValueError(f"control_dt: {control_dt} s must be in 0.001 .. 1")
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
+        raise ValueError(
+            f"substeps: {substeps!r} must be a whole number above 0: control_dt is a "
+            "multiple of the simulation's step"
+        )
+    if max_cycles is not None and max_cycles < 1:
+        raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
 
 
 def _scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
