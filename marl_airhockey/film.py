@@ -91,7 +91,8 @@ def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".gif":
         # One palette and no dithering: frames then differ only where things move.
-        palette = Image.fromarray(pictures[0]).quantize(128)
+        some = [pictures[0], pictures[len(pictures) // 2], pictures[-1]]
+        palette = Image.fromarray(np.concatenate(some)).quantize(128)
         frames = [
             Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
             for p in pictures
