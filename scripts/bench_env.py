@@ -26,6 +26,9 @@ from marl_airhockey.backends.pymunk import Pymunk
 
 Run = Callable[[int], int]
 """Steps an environment so many times and returns how many agents it has."""
+WORLDS = 256
+CHUNK = 2 * WORLDS
+"""Steps between two looks at the clock."""
 
 
 def ours(scenario: str, backend: str) -> Run:
@@ -97,6 +100,23 @@ def bare(scenario: str) -> Run:
     return run
 
 
+def batched(scenario: str) -> Run:
+    """Our arrays over many worlds at once, restarts included."""
+    world = ah.make_world(scenario, WORLDS)
+    world.reset(0)
+    drawn = np.random.default_rng(0).uniform(-1, 1, (64, WORLDS, len(world.open), 2))
+    count = 0
+
+    def run(steps: int) -> int:
+        nonlocal count
+        for _ in range(steps // WORLDS):
+            count += 1
+            world.step(drawn[count & 63])
+        return len(world.open)
+
+    return run
+
+
 def multiwalker() -> Run:
     """PettingZoo's multiwalker: three walkers on Box2D."""
     from pettingzoo.sisl import multiwalker_v9
@@ -115,8 +135,8 @@ def rate(run: Run, seconds: float) -> tuple[float, int]:
     """Env-steps per CPU-second, and agents."""
     steps, began = 0, time.process_time()
     while (spent := time.process_time() - began) < seconds:
-        agents = run(50)
-        steps += 50
+        agents = run(CHUNK)
+        steps += CHUNK
     return steps / spent, agents
 
 
@@ -128,6 +148,7 @@ def main(
     """Run all in turns and print rates and ratios."""
     makers: dict[str, Callable[[], Run]] = {
         "ours, dict env": lambda: ours(scenario, "pymunk"),
+        f"ours, {WORLDS} worlds": lambda: batched(scenario),
         "bare cpSpaceStep": lambda: bare(scenario),
         "multiwalker": multiwalker,
         "simple_tag": simple_tag,
@@ -137,7 +158,7 @@ def main(
     for name, maker in makers.items():
         try:
             runs[name] = maker()
-            runs[name](200)
+            runs[name](CHUNK)
         except ImportError as error:
             console.print(f"{name}: left out ({error})")
     rates: dict[str, list[float]] = {name: [] for name in runs}
