@@ -1,7 +1,11 @@
 """Every mistake gets one clear error that names it; a reset makes the env usable."""
 
+from dataclasses import replace
+from functools import cached_property
+
 import numpy as np
 import pytest
+from pair import Pair
 
 import marl_airhockey as ah
 from marl_airhockey.cast import Cast
@@ -128,6 +132,16 @@ def test_stepping_before_a_reset_and_after_the_end():
     env.step(GOOD)
     with pytest.raises(RuntimeError, match="render_mode"):
         env.render()
+
+
+def test_a_cast_that_a_backend_cannot_play_is_refused_with_the_reason(backend):
+    class BlocksAndMouths(Pair):
+        @cached_property
+        def cast(self):
+            return replace(super().cast, blocks=2)
+
+    with pytest.raises(ValueError, match="slide into a goal mouth"):
+        ah.parallel_env(BlocksAndMouths(), backend=backend)
 
 
 def test_a_world_wants_its_shape():

@@ -36,6 +36,12 @@ class Pymunk(Backend):
         self._quiet = still_state(cast.bodies, num_worlds, mouths)
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
 
+    @classmethod
+    def supports(cls, cast: Cast) -> str | None:
+        if cast.blocks and any(mouth.width for mouth in cast.mouths):
+            return "blocks could slide into a goal mouth; leave out one or the other"
+        return None
+
     def set_physics(self, values: dict[str, Array], mask: Array) -> None:
         for i in np.flatnonzero(mask):
             row = {name: float(value[i]) for name, value in values.items()}
