@@ -56,6 +56,11 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
     return chosen
 
 
+def environment(backend: str, profile: str, option: list[str] | None) -> Keywords:
+    """Keywords of an environment from the options that commands share."""
+    return {"backend": backend, "profile": profile, "options": settings(option)}
+
+
 @app.command("list")
 def list_scenarios(
     scenario: Annotated[str | None, typer.Argument(help="Describe this one.")] = None,
@@ -155,11 +160,7 @@ def evaluate_driver(
     as_json: AsJson = False,
 ) -> None:
     """Measure a driver over episodes that training never sees."""
-    keywords: Keywords = {
-        "backend": backend,
-        "profile": profile,
-        "options": settings(option),
-    }
+    keywords = environment(backend, profile, option)
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     seated = make_driver(driver)
@@ -231,11 +232,7 @@ def watch(
     """Watch a driver play, in a window or as a video."""
     from marl_airhockey.film import film
 
-    keywords: Keywords = {
-        "backend": backend,
-        "profile": profile,
-        "options": settings(option),
-    }
+    keywords = environment(backend, profile, option)
     film(scenario, make_driver(driver), keywords, seed, episodes, video)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

@@ -79,7 +79,3 @@ class Draws:
         pair = self.uniform(0.0, 1.0, 2, *shape)
         radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))
-
-    def integers(self, high: int, *shape: int) -> Array:
-        """(W, *shape) integers uniform in 0 .. high - 1."""
-        return self.uniform(0.0, high, *shape).astype(np.int64)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -209,14 +209,12 @@ def _act_ms(world: World) -> float:
     state = view.state.map(lambda x: x[:1])
     seen = view.observation
     one = {k: v[:1] for k, v in seen.items()} if isinstance(seen, Mapping) else seen[:1]
-    single = type(view)(
+    single = replace(
+        view,
         state=state,
         observation=one,
-        labels=view.labels,
         top_speed=view.top_speed[:1],
-        reach=view.reach,
         draws=view.draws.select(np.array([0])),
-        seat=view.seat,
         recall={k: v[:1] for k, v in view.recall.items()},
     )
     memory = seat.driver.start(world.cast.seats[0], single.draws, 1)

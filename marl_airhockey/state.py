@@ -178,14 +178,13 @@ ARRAYS = tuple(
 )
 
 
-def still_state(bodies: Bodies, worlds: int, mouths: int, substeps: int = 0) -> State:
+def still_state(bodies: Bodies, worlds: int, mouths: int) -> State:
     """``worlds`` rows with every body at the origin, at rest, and no contact.
 
     Args:
         bodies: the cast's bodies.
         worlds: number of rows.
         mouths: number of mouths in the cast.
-        substeps: length of ``path`` less one; 0 leaves it out.
     """
     pucks, pairs = (worlds, bodies.pucks), (worlds, bodies.paddles, bodies.pucks)
     n = len(bodies)
@@ -202,5 +201,4 @@ def still_state(bodies: Bodies, worlds: int, mouths: int, substeps: int = 0) -> 
         crossed_velocity=np.zeros((*pucks, mouths, 2)),
         visible=np.ones(pucks, np.bool_),
         time=np.zeros(worlds),
-        path=np.zeros((worlds, substeps + 1, bodies.movers, 4)) if substeps else None,
     )

@@ -103,10 +103,6 @@ class Table:
         c, s = self.normals[side]
         return np.array([[c, s], [-s, c]])
 
-    def opposite(self, side: int) -> int:
-        """The side that faces ``side``."""
-        return int(np.argmin(self.normals @ self.normals[side]))
-
 
 TABLES: dict[str, Table] = {
     "standard": Table.rectangle(1.6764, 0.6096),

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
 
 from marl_airhockey.backend import Backend, Command
 from marl_airhockey.draws import Draws
+from marl_airhockey.driver import Driver
 from marl_airhockey.episode import Episode, Step
 from marl_airhockey.limits import Excess, Reach, limits
 from marl_airhockey.observer import Observation, Observer
@@ -41,7 +41,7 @@ class World:
         self,
         scenario: Scenario,
         backend: Backend,
-        drivers: Mapping[int, Any],
+        drivers: Mapping[int, Driver],
         physics: Physics,
         observe: str = "velocity",
         max_cycles: int | None = None,

@@ -147,11 +147,14 @@ def versions() -> dict[str, str]:
     found = {"python": platform.python_version()}
     for name in (*names, "stable_baselines3"):
         found[name] = metadata.version(name)
-    here = Path(__file__).parent
-    command = ["git", "-C", str(here), "rev-parse", "HEAD"]
+    git = ["git", "-C", str(Path(__file__).parent)]
     try:
-        git = subprocess.run(command, capture_output=True, text=True, check=True)
-        found["git"] = git.stdout.strip()
+        # An installed copy may lie inside a repository of somebody else's.
+        tracked = [*git, "ls-files", "--error-unmatch", Path(__file__).name]
+        subprocess.run(tracked, capture_output=True, check=True)
+        head = [*git, "rev-parse", "HEAD"]
+        done = subprocess.run(head, capture_output=True, text=True, check=True)
+        found["git"] = done.stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         found["git"] = "unknown"
     return found
