@@ -51,46 +51,61 @@ _nothing = _zero.ctypes.data
 @njit(cache=False)
 def drift(
     worlds: Array,
-    velocity: Array,
     goal: Array,
+    kicks: Array,
     dt: float,
     substeps: int,
     flags: Array,
-    ways: Array,
-) -> None:
+    position: Array,
+    velocity: Array,
+    path: Array,
+) -> int:
     """Step quiet worlds with one paddle each until the end or the first event.
 
     Args:
         worlds: (B, 5) addresses: the space, its paddle's body, and its `Reader`'s.
-        velocity: (B, 2) at the start, m/s.
-        goal: (B, 2) at the end, m/s; the ramp between them is linear.
+        goal: (B, 1, 2) paddle velocity at the end, m/s; the ramp to it is linear.
+        kicks: (B, N) what a body's vx is ahead of what Chipmunk says, m/s.
         dt: of a substep, s.
         substeps: physics steps in the control step.
         flags: (B, 2) EVENT, set by callbacks, and SUBSTEP. A world whose EVENT is set
             before is left alone, with SUBSTEP -1.
-        ways: (B, substeps + 1, movers, 4) filled with x, y, vx, vy at every substep, or
-            (B, 1, movers, 4) with those at the end. What an event ends is not filled.
+        position: (B, N, 2) m, of the movers changed in place.
+        velocity: (B, N, 2) m/s, of the movers changed in place.
+        path: (B, substeps + 1, movers, 4) filled with x, y, vx, vy at every substep
+            (without kicks), or (B, 0, movers, 4).
+
+    Returns:
+        The number of worlds that Python must go on with; of these, position and
+        velocity are as they were.
     """
-    every = ways.shape[1] > 1
+    every, left = path.shape[1] > 0, 0
+    rows = np.empty(path.shape[2:])
     for b in range(len(worlds)):
         flags[b, SUBSTEP] = -1
-        if flags[b, EVENT]:
-            continue
-        rx = (goal[b, 0] - velocity[b, 0]) / substeps
-        ry = (goal[b, 1] - velocity[b, 1]) / substeps
-        x, y = velocity[b, 0] + 0.5 * rx, velocity[b, 1] + 0.5 * ry
-        if every:
-            _record(worlds[b], ways[b, 0])
-        for k in range(substeps):
-            flags[b, SUBSTEP] = k
-            _set_velocity(worlds[b, 1], x + k * rx, y + k * ry)
-            _advance(worlds[b, 0], dt)
-            if flags[b, EVENT]:
-                break
+        if not flags[b, EVENT]:
+            vx, vy = velocity[b, 0, 0], velocity[b, 0, 1]
+            rx, ry = (goal[b, 0, 0] - vx) / substeps, (goal[b, 0, 1] - vy) / substeps
             if every:
-                _record(worlds[b], ways[b, k + 1])
-        if not every and not flags[b, EVENT]:
-            _record(worlds[b], ways[b, 0])
+                _record(worlds[b], path[b, 0])
+            for k in range(substeps):
+                flags[b, SUBSTEP] = k
+                share = k + 0.5
+                _set_velocity(worlds[b, 1], vx + share * rx, vy + share * ry)
+                _advance(worlds[b, 0], dt)
+                if flags[b, EVENT]:
+                    break
+                if every:
+                    _record(worlds[b], path[b, k + 1])
+        if flags[b, EVENT]:
+            left += 1
+            continue
+        _record(worlds[b], rows)
+        for i in range(len(rows)):
+            position[b, i, 0], position[b, i, 1] = rows[i, 0], rows[i, 1]
+            velocity[b, i, 0], velocity[b, i, 1] = rows[i, 2] + kicks[b, i], rows[i, 3]
+        velocity[b, 0, 0], velocity[b, 0, 1] = goal[b, 0, 0], goal[b, 0, 1]
+    return left
 
 
 @njit(cache=False)

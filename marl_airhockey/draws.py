@@ -7,27 +7,48 @@ and row i of 4096 worlds equals a single world with seed + i.
 
 from __future__ import annotations
 
+import math
 import zlib
+from typing import Any
 
 import numpy as np
+from numba import njit
 
 from marl_airhockey.state import Array
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
+_30, _27, _31, _11 = (np.uint64(n) for n in (30, 27, 31, 11))
 
 
-def _mix(z: Array) -> Array:
-    z = (z ^ (z >> np.uint64(30))) * _MIX_1
-    z = (z ^ (z >> np.uint64(27))) * _MIX_2
-    return np.asarray(z ^ (z >> np.uint64(31)))
+@njit(cache=True)
+def _mix(z: Any) -> Any:
+    z = (z ^ (z >> _30)) * _MIX_1
+    z = (z ^ (z >> _27)) * _MIX_2
+    return z ^ (z >> _31)
 
 
-def _keys(seeds: Array, episodes: Array, purpose: str) -> Array:
-    salt = np.uint64(zlib.crc32(purpose.encode()))
-    worlds = _mix(seeds.astype(np.uint64) * _GOLDEN + _GOLDEN)
-    return _mix(worlds ^ _mix(episodes.astype(np.uint64) * _GOLDEN + salt))
+@njit(cache=True)
+def _begin(
+    keys: Array, counts: Array, rows: Array, seeds: Array, episodes: Array, salt: int
+) -> None:
+    for row in rows:
+        world = _mix(np.uint64(seeds[row]) * _GOLDEN + _GOLDEN)
+        episode = _mix(np.uint64(episodes[row]) * _GOLDEN + np.uint64(salt))
+        keys[row] = _mix(world ^ episode)
+        counts[row] = 0
+
+
+@njit(cache=True)
+def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
+    """Fill ``out`` (W, n) with numbers in [0, 1)."""
+    for i in range(len(rows)):
+        row = rows[i]
+        for k in range(out.shape[1]):
+            counts[row] += np.uint64(1)
+            bits = _mix(keys[row] + counts[row] * _GOLDEN)
+            out[i, k] = (bits >> _11) * 2.0**-53
 
 
 class Draws:
@@ -49,13 +70,16 @@ class Draws:
             episodes: (W,) integer episode numbers.
             purpose: what the numbers are for; streams of two purposes are independent.
         """
-        keys = _keys(seeds, episodes, purpose)
-        return cls(keys, np.zeros(len(keys), np.uint64), np.arange(len(keys)))
+        rows = np.arange(len(seeds))
+        keys, counts = np.zeros((2, len(rows)), np.uint64)
+        draws = cls(keys, counts, rows)
+        draws.renew(rows, seeds, episodes, purpose)
+        return draws
 
-    def renew(self, mask: Array, seeds: Array, episodes: Array, purpose: str) -> None:
-        """Begin the streams of some worlds anew, for their next episode."""
-        self._keys[mask] = _keys(seeds[mask], episodes[mask], purpose)
-        self._counts[mask] = 0
+    def renew(self, rows: Array, seeds: Array, episodes: Array, purpose: str) -> None:
+        """Begin the streams of some worlds, by index, for their next episode."""
+        salt = zlib.crc32(purpose.encode())
+        _begin(self._keys, self._counts, rows, seeds, episodes, salt)
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -66,13 +90,9 @@ class Draws:
 
     def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
         """(W, *shape) numbers uniform in [low, high)."""
-        size = int(np.prod(shape, dtype=int))
-        first = self._counts[self._rows]
-        self._counts[self._rows] = first + np.uint64(size)
-        steps = first[:, None] + np.arange(1, size + 1, dtype=np.uint64)
-        bits = _mix(self._keys[self._rows][:, None] + steps * _GOLDEN)
-        unit = (bits >> np.uint64(11)) * 2.0**-53
-        return low + (high - low) * unit.reshape(len(self._rows), *shape)
+        unit = np.empty((len(self._rows), math.prod(shape)))
+        _unit(self._keys, self._counts, self._rows, unit)
+        return low + (high - low) * unit.reshape(len(unit), *shape)
 
     def normal(self, *shape: int) -> Array:
         """(W, *shape) standard normal numbers (Box and Muller's transform)."""

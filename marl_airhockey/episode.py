@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from marl_airhockey.limits import Excess
 from marl_airhockey.observer import Observation
 from marl_airhockey.state import Array
 
@@ -24,8 +23,9 @@ class Step:
     """Reward terms by name, (B, open) each"""
     sent: Array
     """(B, open, 2) what acted: velocity as a fraction of top speed, ego frame"""
-    excess: Excess
-    """By how much what was asked exceeded the limits, (B, seats) each"""
+    excess: Array
+    """(B, seats, 5) by how much what was asked exceeded the limits, see
+    `limits.EXCESS`"""
     cost: Array
     """(B, open) the excesses in units of their limits, summed"""
     success: Array

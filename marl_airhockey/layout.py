@@ -105,13 +105,15 @@ class Ego:
         seats = vectors[..., None, :, :]
         if self.scope.straight:
             return seats
-        return np.asarray(seats @ self.scope.rotations.swapaxes(-1, -2))
+        turned: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
+        return turned
 
     def _own(self, vectors: Array) -> Array:
         if self.scope.straight:
             return vectors
         seats = np.arange(vectors.shape[-2])
-        return np.asarray(self.turn(vectors)[..., seats, seats, :])
+        own: Array = self.turn(vectors)[..., seats, seats, :]
+        return own
 
 
 class Piece(ABC):
@@ -154,8 +156,8 @@ class Layout:
         """(..., S, columns) float32, inside the bounds."""
         seats = len(self.scope.cast.seats)
         shape = (*ego.state.time.shape, seats, len(self.labels))
-        out = np.empty(shape, np.float32)
+        out = np.empty_like(ego.state.position, shape=shape)
         for piece, part in self._parts:
             piece.write(ego, out[..., part])
-        np.maximum(out, self.low, out=out)
-        return np.minimum(out, self.high, out=out)
+        inside = np.minimum(np.maximum(out, self.low), self.high)
+        return inside.astype(np.float32)

@@ -52,19 +52,21 @@ class Reach:
         return Reach(normals, offsets, share, passes=1 if sharpest > -1e-9 else 12)
 
 
-class Excess(NamedTuple):
-    """By how much the asked velocity went beyond each limit, (B, S), zero if not."""
+class Sent(NamedTuple):
+    """What a filter lets through, and what it held back."""
 
-    speed: Array
-    """m/s"""
-    acceleration: Array
-    """m/s2"""
-    jerk: Array
-    """m/s3"""
-    reach: Array
-    """m/s taken off toward an edge of the reach"""
-    cost: Array
-    """All of them in units of their limits, summed"""
+    velocity: Array
+    """(B, S, 2) m/s, reached at the end of the step by a linear ramp"""
+    pushed: Array
+    """(B, S, 2) m/s2, the acceleration that it takes"""
+    excess: Array
+    """(B, S, 5) by how much the asked velocity went beyond each limit, zero if not: see
+    `EXCESS`"""
+
+
+EXCESS = ("speed", "acceleration", "jerk", "reach", "cost")
+"""Of the asked velocity: m/s, m/s2, m/s3, m/s taken off toward an edge of the reach,
+and all of them in units of their limits, summed."""
 
 
 def limits(
@@ -76,30 +78,24 @@ def limits(
     speed: Array,
     acceleration: Array,
     dt: float,
-) -> tuple[Array, Excess]:
-    """What is sent for what is asked.
-
-    All vectors are in the table frame; the sent velocity is reached at the end of the
-    step by a linear ramp.
+) -> Sent:
+    """What is sent for what is asked, in the table frame.
 
     Args:
-        asked: (B, S, 2) wanted velocity, m/s.
-        position: (B, S, 2) of the paddles, m.
-        velocity: (B, S, 2) of the paddles, m/s: what was sent last.
+        asked: (B, S, 2) wanted velocity as a fraction of top speed.
+        position: (B, N, 2) of all bodies, paddles first, m.
+        velocity: (B, N, 2) of all bodies, m/s; a paddle's is what was sent last.
         pushed: (B, S, 2) acceleration of the last step, m/s2.
         reach: the seats' reaches.
         speed: (B,) top speed, m/s.
         acceleration: (B,) largest change of velocity, m/s2.
         dt: length of a control step, s.
 
-    Returns:
-        The sent velocity (B, S, 2) and the excess of the asked one.
-
     Raises:
         ValueError: an asked velocity that is not finite.
     """
-    sent = np.empty(asked.shape)
-    excess = np.empty((5, *asked.shape[:-1]))
+    sent, push = np.empty(asked.shape), np.empty(asked.shape)
+    excess = np.empty((*asked.shape[:-1], len(EXCESS)))
     finite = _filter(
         asked,
         position,
@@ -113,11 +109,12 @@ def limits(
         acceleration,
         dt,
         sent,
+        push,
         excess,
     )
     if not finite:
         raise ValueError("action: every element must be finite, got nan or inf")
-    return sent, Excess(*excess)
+    return Sent(sent, push, excess)
 
 
 @njit(cache=True)
@@ -134,6 +131,7 @@ def _filter(
     acceleration: Array,
     dt: float,
     sent: Array,
+    push: Array,
     excess: Array,
 ) -> bool:
     """`limits` for each seat of each world; False if an asked one is not finite."""
@@ -142,7 +140,7 @@ def _filter(
     for b in range(asked.shape[0]):
         top, most = speed[b], acceleration[b] * dt
         for s in range(asked.shape[1]):
-            ax, ay = asked[b, s, 0], asked[b, s, 1]
+            ax, ay = top * asked[b, s, 0], top * asked[b, s, 1]
             vx, vy = velocity[b, s, 0], velocity[b, s, 1]
             norm = np.sqrt(ax * ax + ay * ay)
             if not np.isfinite(norm):
@@ -168,11 +166,12 @@ def _filter(
             if (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
                 sx, sy = _within(sx, sy, vx, vy, most, normals[s], fastest, passes)
             sent[b, s, 0], sent[b, s, 1] = sx, sy
+            push[b, s, 0], push[b, s, 1] = (sx - vx) / dt, (sy - vy) / dt
 
             jx = dx / dt - pushed[b, s, 0]
             jy = dy / dt - pushed[b, s, 1]
             jolt = np.sqrt(jx * jx + jy * jy) / dt
-            over = excess[:, b, s]
+            over = excess[b, s]
             over[0] = max(norm - top * (1 + 1e-6), 0.0)
             over[1] = max(change / dt - acceleration[b] * (1 + 1e-6), 0.0)
             over[2] = max(jolt - JERK * acceleration[b], 0.0)

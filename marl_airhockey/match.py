@@ -164,10 +164,9 @@ class _Tally:
     def add(self, step: Any) -> None:
         """Take the step that was just made."""
         world, live = self.world, ~self.done
-        excess, dt = step.excess, world.control_dt
+        dt = world.control_dt
         self.length += live
-        over = excess.speed + excess.acceleration + excess.jerk + excess.reach
-        self.violations += int(((over[:, 0] > 0) & live).sum())
+        self.violations += int(((step.excess[:, 0, -1] > 0) & live).sum())
         pushed = (world.sent[:, 0] - self._last) / dt
         self._jolts.append(((pushed - self._pushed)[live] / dt).ravel())
         self._pushed, self._last = pushed, world.sent[:, 0]

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from marl_airhockey.fuse import Fused, Sink, Source
 from marl_airhockey.layout import FRAMES, OBSERVE, Ego, Layout, Scope
 from marl_airhockey.physics import Physics, unknown
 from marl_airhockey.scenario import GoalScenario, Scenario
-from marl_airhockey.sensor import Sensor
+from marl_airhockey.sensor import ALL, Rows, Sensor
 from marl_airhockey.state import Array, Memory, State
 
 Observation = Array | Mapping[str, Array]
@@ -33,6 +34,7 @@ class Observer:
         self.scenario, self.sensor, self.observe = scenario, sensor, observe
         self._top_speed = physics.highest("paddle_speed")
         self._layouts: dict[str, Layout] = {}
+        self._shows: dict[str, Fused] = {}
         self.prepare(observe)
 
     def prepare(self, observe: str) -> Layout:
@@ -47,7 +49,8 @@ class Observer:
             pieces = tuple(
                 p for p in self.scenario.observation if not (apart and p.goal)
             )
-            self._layouts[observe] = Layout(pieces, scope)
+            self._layouts[observe] = layout = Layout(pieces, scope)
+            self._shows[observe] = self._show(layout)
         return self._layouts[observe]
 
     @property
@@ -56,38 +59,58 @@ class Observer:
         return self._layouts[self.observe]
 
     def read(
-        self, sensed: State, memory: Memory, seats: Array, observe: str | None = None
+        self,
+        sensed: State,
+        memory: Memory,
+        seats: Array,
+        observe: str | None = None,
+        worlds: Rows = ALL,
     ) -> Observation:
         """Observations of some seats, in their order.
 
         Args:
-            sensed: the sensed state of B worlds, table frame.
-            memory: the scenario's.
+            sensed: the sensed state of W worlds, table frame.
+            memory: the scenario's, of these worlds.
             seats: (n,) indices of seats.
             observe: the form; None for the open seats'.
+            worlds: which they are, by index.
         """
         observe = observe or self.observe
         if observe == "pixels":
-            return self._pictures(memory, seats)
-        layout = self.prepare(observe)
-        ego = Ego(sensed, memory, self.sensor.history, layout.scope)
-        flat = layout.read(ego)
-        if len(seats) != flat.shape[1]:
-            flat = flat[:, seats]
-        scenario = self.scenario
-        if scenario.goals == "flat" or not isinstance(scenario, GoalScenario):
-            return flat
-        goals = {
-            "achieved_goal": scenario.achieved(sensed, memory),
-            "desired_goal": scenario.desired(memory),
-        }
-        shown = {k: v[:, None].astype(np.float32) for k, v in goals.items()}
+            return self._pictures(memory, seats, worlds)
+        self.prepare(observe)
+        history = {"history": self.sensor.history[worlds]}
+        (shown,) = self._shows[observe](vars(sensed), memory, history)
+        if len(seats) != len(self.scenario.cast.seats):
+            shown["flat"] = shown["flat"][:, seats]
+        if len(shown) == 1:
+            return shown["flat"]
+        flat = shown.pop("flat")
         return {"observation": flat, **shown}
 
-    def _pictures(self, memory: Memory, seats: Array) -> Array:
+    def _show(self, layout: Layout) -> Fused:
+        """What reads a layout, and the goals beside it, as one compiled loop."""
+        game = self.scenario
+
+        def show(sensed: Source, memory: Memory, sensor: Source) -> tuple[Sink]:
+            state = State(**sensed)
+            ego = Ego(state, memory, sensor["history"], layout.scope)
+            shown = {"flat": layout.read(ego)}
+            if game.goals == "dict" and isinstance(game, GoalScenario):
+                goals = {
+                    "achieved_goal": game.achieved(state, memory),
+                    "desired_goal": game.desired(memory),
+                }
+                for name, goal in goals.items():
+                    shown[name] = goal[..., None, :].astype(np.float32)
+            return (shown,)
+
+        return Fused(show, f"the observation of {game.name!r}")
+
+    def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
         from marl_airhockey.pixels import small_picture
 
-        cast, frames = self.scenario.cast, self.sensor.frames
+        cast, frames = self.scenario.cast, self.sensor.frames[worlds]
         shape = (len(frames), len(seats), PIXELS, PIXELS, FRAMES)
         out = np.empty(shape, np.uint8)
         for b, world in enumerate(frames):

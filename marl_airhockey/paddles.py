@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from marl_airhockey.state import Array
 
 
+@njit(cache=True)
 def meet(position: Array, velocity: Array, told: Array, diameter: float) -> bool:
     """Separate overlapping paddles in place; True if any pair overlapped.
 
@@ -21,20 +23,33 @@ def meet(position: Array, velocity: Array, told: Array, diameter: float) -> bool
         diameter: distance of two centres in contact, m.
     """
     met = False
-    for i in range(len(position) - 1):
-        for j in range(i + 1, len(position)):
-            gap = position[j] - position[i]
-            distance = float(np.hypot(gap[0], gap[1]))
+    for i in range(len(told) - 1):
+        for j in range(i + 1, len(told)):
+            nx = position[j, 0] - position[i, 0]
+            ny = position[j, 1] - position[i, 1]
+            distance = np.sqrt(nx * nx + ny * ny)
             if distance >= diameter or (told[i] and told[j]):
                 continue
             met = True
-            normal = gap / distance if distance > 1e-9 else np.array([1.0, 0.0])
-            share = 0.5 if told[i] == told[j] else float(told[j])
-            position[i] -= share * (diameter - distance) * normal
-            position[j] += (1 - share) * (diameter - distance) * normal
-            vi, vj = float(velocity[i] @ normal), float(velocity[j] @ normal)
+            if distance > 1e-9:
+                nx, ny = nx / distance, ny / distance
+            else:
+                nx, ny = 1.0, 0.0
+            share = 0.5
+            if told[i] != told[j]:
+                share = 1.0 if told[j] else 0.0
+            back, forth = share * (diameter - distance), 1.0 - share
+            forth *= diameter - distance
+            position[i, 0] -= back * nx
+            position[i, 1] -= back * ny
+            position[j, 0] += forth * nx
+            position[j, 1] += forth * ny
+            vi = velocity[i, 0] * nx + velocity[i, 1] * ny
+            vj = velocity[j, 0] * nx + velocity[j, 1] * ny
             if vi > vj:
-                common = (1 - share) * vi + share * vj
-                velocity[i] += (common - vi) * normal
-                velocity[j] += (common - vj) * normal
+                common = (1.0 - share) * vi + share * vj
+                velocity[i, 0] += (common - vi) * nx
+                velocity[i, 1] += (common - vi) * ny
+                velocity[j, 0] += (common - vj) * nx
+                velocity[j, 1] += (common - vj) * ny
     return met

@@ -9,6 +9,7 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from marl_airhockey.episode import Step
+from marl_airhockey.limits import EXCESS
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.spaces import (
@@ -136,7 +137,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             raise RuntimeError("step: call reset() first; no episode is running")
         result = self.world.step(self._array(actions))
         agents = self.agents
-        terminated, truncated = bool(result.terminated[0]), bool(result.truncated[0])
+        terminated, truncated = result.terminated.item(0), result.truncated.item(0)
         rewards = result.reward[0].tolist()
         outcome = (
             self._dict(result.observation),
@@ -158,7 +159,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     def _array(self, actions: Mapping[str, Any]) -> Array:
         """(1, open, 2) from a dict with an action for each agent and no other."""
         agents = self.agents
-        if len(actions) != len(agents) or any(a not in actions for a in agents):
+        if actions.keys() != self._action_spaces.keys():
             missing = sorted(set(agents) - set(actions))
             extra = sorted(set(actions) - set(agents))
             raise ValueError(f"actions: missing agents {missing}, extra {extra}")
@@ -174,7 +175,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         return array
 
     def _dict(self, observation: Any) -> dict[str, Any]:
-        if isinstance(observation, Mapping):
+        if isinstance(observation, dict):
             return {
                 agent: {k: v[0, i] for k, v in observation.items()}
                 for i, agent in enumerate(self.possible_agents)
@@ -183,18 +184,13 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
 
     def _info(self, result: Step, i: int) -> dict[str, Any]:
         seat = self.world.open[i]
-        excess = result.excess
+        *over, cost = result.excess[0, seat].tolist()
         return {
-            "reward": {k: float(v[0, i]) for k, v in result.terms.items()},
+            "reward": {k: v.item(i) for k, v in result.terms.items()},
             "sent": result.sent[0, i],
-            "success": bool(result.success[0, i]),
-            "constraints": {
-                "speed": float(excess.speed[0, seat]),
-                "acceleration": float(excess.acceleration[0, seat]),
-                "jerk": float(excess.jerk[0, seat]),
-                "reach": float(excess.reach[0, seat]),
-            },
-            "cost": float(result.cost[0, i]),
+            "success": result.success.item(i),
+            "constraints": dict(zip(EXCESS, over, strict=False)),
+            "cost": cost,
         }
 
     def state(self) -> Array:

@@ -16,7 +16,8 @@ TOUCH_GAP = 0.15
 def length(vector: Array) -> Array:
     """Euclidean norm of (..., 2) vectors, (...)."""
     x, y = vector[..., 0], vector[..., 1]
-    return np.asarray(np.sqrt(x * x + y * y))
+    size: Array = np.sqrt(x * x + y * y)
+    return size
 
 
 def tolerance(value: Array, bound: float, margin: float) -> Array:
@@ -49,8 +50,6 @@ def count_touches(memory: Memory, before: State, after: State) -> Memory:
     earns a single touch.
     """
     dt = (after.time - before.time)[..., None, None]
-    if not after.contact:
-        return {**memory, "apart": memory["apart"] + dt}
     began = after.touched > 0
     at = np.where(began, after.touched_at, 0.0)
     distinct = began & (memory["apart"] + at >= TOUCH_GAP)
@@ -97,7 +96,8 @@ def alike(
     """
     speed, aim = length(velocity), length(wanted)
     along = (velocity * wanted).sum(-1) >= np.cos(angle) * speed * aim
-    return np.asarray(along & (np.abs(speed - aim) <= share * aim + slack))
+    agree: Array = along & (np.abs(speed - aim) <= share * aim + slack)
+    return agree
 
 
 def contact_height(before: State, after: State) -> Array:
@@ -162,14 +162,16 @@ def enters(
         wanted = velocity[..., None, :]
         error = length(puck[..., 2:] - wanted)
         inside &= alike(puck[..., 2:], wanted, angle, speed_share, speed_slack)
-    return np.asarray(inside.any(-1)), gap, error
+    entered: Array = np.logical_or.reduce(inside, axis=-1)
+    return entered, gap, error
 
 
 def jitter(before: State, sent: Array, top_speed: Array | float) -> Array:
     """(..., seats) squared change of the sent velocity, in top speeds."""
     change = (sent - before.paddle_velocity) / top_speed
     x, y = change[..., 0], change[..., 1]
-    return np.asarray(x * x + y * y)
+    squared: Array = x * x + y * y
+    return squared
 
 
 def turning(before: State, sent: Array) -> Array:

@@ -257,4 +257,5 @@ class GoalScenario(Scenario):
 
     def met(self, after: State, memory: Memory) -> Array:
         reward = self.goal_reward(self.achieved(after, memory), self.desired(memory))
-        return np.asarray(reward > 0)
+        met: Array = reward > 0
+        return met

@@ -39,21 +39,24 @@ class Driven:
                 f"of the environment's {control_dt} s"
             )
         self._layout = observer.prepare(driver.observe or observer.observe)
+        self._num_worlds = num_worlds
         never = np.zeros(num_worlds, np.int64)
         self._draws = Draws.keyed(never, never, f"driver {index}")
         self._held = np.zeros((num_worlds, 2))
         self._memory: dict[str, Array] = {}
         driver.__enter__()
 
-    def start(self, mask: Array, seeds: Array, episodes: Array) -> None:
-        """Begin an episode in the worlds of a mask."""
-        self._draws.renew(mask, seeds, episodes, f"driver {self.index}")
-        self._held[mask] = 0.0
-        rows = self.driver.start(self._seat, self._draws.select(mask), int(mask.sum()))
+    def start(self, worlds: Array, seeds: Array, episodes: Array) -> None:
+        """Begin an episode in some worlds, by index."""
+        self._draws.renew(worlds, seeds, episodes, f"driver {self.index}")
+        self._held[worlds] = 0.0
+        draws = self._draws.select(worlds)
+        rows = self.driver.start(self._seat, draws, len(worlds))
         for name, row in rows.items():
             if name not in self._memory:
-                self._memory[name] = np.zeros((len(mask), *row.shape[1:]), row.dtype)
-            self._memory[name][mask] = row
+                shape = (self._num_worlds, *row.shape[1:])
+                self._memory[name] = np.zeros(shape, row.dtype)
+            self._memory[name][worlds] = row
 
     def measured(self) -> Array | None:
         """(B, 4) where the paddle is, if the driver tells it."""

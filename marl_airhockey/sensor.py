@@ -20,7 +20,7 @@ OCCLUSION_SECONDS = 0.1
 
 
 Rows = Array | slice
-"""Some of the worlds: a mask (B,), or all of them."""
+"""Some of the worlds: indices (W,), or all of them."""
 ALL = slice(None)
 
 
@@ -88,27 +88,27 @@ class Sensor:
         """Whether `history` and `frames` are kept: only if anybody looks at them."""
 
     def start(
-        self, mask: Array, state: State, values: dict[str, Array], draws: Draws
+        self, worlds: Array, state: State, values: dict[str, Array], draws: Draws
     ) -> State:
-        """Begin an episode in the worlds of a mask and sense its first state.
+        """Begin an episode in some worlds and sense its first state.
 
         Args:
-            mask: (B,).
+            worlds: (W,) their indices.
             state: of all B worlds.
             values: physical parameters, (B,) each.
             draws: the sensor's streams.
         """
         if not self.ideal:
-            position, velocity = (x[mask, self.camera] for x in _motion(state))
+            position, velocity = (x[worlds, self.camera] for x in _motion(state))
             ago = np.arange(self.delay.depth, 0, -1)[:, None, None] * self.control_dt
-            self.delay.fill(mask, position[:, None] - velocity[:, None] * ago)
-            late = values["observation_delay"][mask] + self.control_dt
-            self._place[mask] = position - velocity * late[:, None, None]
-            self._visible[mask] = True
-        sensed = self.sense(state, values, draws, mask)
+            self.delay.fill(worlds, position[:, None] - velocity[:, None] * ago)
+            late = values["observation_delay"][worlds] + self.control_dt
+            self._place[worlds] = position - velocity * late[:, None, None]
+            self._visible[worlds] = True
+        sensed = self.sense(state, values, draws, worlds)
         if self.keeps_history:
-            self.history[mask] = self.history[mask][:, -1:]
-            self.frames[mask] = self.frames[mask][:, -1:]
+            self.history[worlds] = self.history[worlds][:, -1:]
+            self.frames[worlds] = self.frames[worlds][:, -1:]
         return sensed
 
     def sense(
@@ -119,6 +119,8 @@ class Sensor:
         rows: Rows = ALL,
     ) -> State:
         """The sensed state; ``rows`` tells in which worlds time has gone on."""
+        if self.ideal and not self.keeps_history:
+            return state
         sensed = state
         if not self.ideal:
             self._look(state, values, draws.select(rows), rows)

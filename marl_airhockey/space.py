@@ -14,7 +14,7 @@ from marl_airhockey.cast import Cast
 from marl_airhockey.chipmunk import EVENT, SUBSTEP, Reader, address
 from marl_airhockey.paddles import meet
 from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
-from marl_airhockey.rails import Rails
+from marl_airhockey.rails import sides, slip
 from marl_airhockey.state import Array
 from marl_airhockey.table import GRAVITY
 
@@ -54,7 +54,7 @@ class Space:
         self.crossed = np.zeros((bodies.pucks, len(cast.mouths)), np.bool_)
         self.crossed_velocity = np.zeros((*self.crossed.shape, 2))
         self._shapes: dict[pymunk.Shape, int] = {}
-        self._rails = Rails(cast)
+        self._sides = sides(cast)
         self._build_bodies()
         self._build_walls()
         space.on_collision(PADDLE, PUCK, begin=self._touch, separate=self._part)
@@ -305,9 +305,12 @@ class Space:
                 share = PUCK_SPEED_CAP / speed2**0.5
                 lib.cpBodySetVelocity(body, (vx * share - self.kick, vy * share))
             puck = self.bodies[first + k]
-            (x, y), paddles = puck.position, self.bodies[self.cast.bodies.paddle]
-            free = self._rails.slip(x, y, [b.position for b in paddles])
-            if free is not None:
+            (x, y), table = puck.position, self.cast.table
+            paddles = self.bodies[self.cast.bodies.paddle]
+            hands = np.array([paddle.position for paddle in paddles])
+            radius = table.puck_radius
+            free = slip(self._sides, radius, x, y, hands, radius + table.paddle_radius)
+            if free != (x, y):
                 puck.position = free
 
     def _park(self, puck: int) -> None:

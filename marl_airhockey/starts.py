@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
@@ -18,8 +19,14 @@ PADDLE_Y = (-0.10, 0.10)
 
 def place(draws: Draws, x: tuple[float, float], y: tuple[float, float]) -> Array:
     """(W, 2) points uniform in a box of the standard table, m."""
-    low, high = np.array([x[0], y[0]]), np.array([x[1], y[1]])
+    low, high = _corners(x, y)
     return draws.uniform(low, high, 2)
+
+
+@cache
+def _corners(x: tuple[float, float], y: tuple[float, float]) -> tuple[Array, Array]:
+    low, high = np.array([x, y]).T
+    return low, high
 
 
 def first_state(cast: Cast, worlds: int) -> State:
@@ -50,6 +57,9 @@ def falling(draws: Draws, cast: Cast) -> State:
             gap = np.linalg.norm(rows[:, None, 0] - others, axis=-1)
             return np.asarray((gap > 3 * cast.table.puck_radius).all(-1))
 
+        if k == first:
+            state.position[:, k], state.velocity[:, k] = falling_puck(draws)
+            continue
         puck = redraw(draws, lambda some: np.stack(falling_puck(some), 1), apart)
         state.position[:, k], state.velocity[:, k] = puck[:, 0], puck[:, 1]
     return state

@@ -102,8 +102,6 @@ class State:
     """(..., pucks) bool: seen by the sensor"""
     time: Array
     """(...) s since the start of the episode"""
-    contact: bool = True
-    """False if no paddle touched any puck in any world: saves looking"""
     path: Array | None = None
     """(..., K + 1, movers, 4) x, y, vx, vy at every substep, if the cast asks for it"""
     extra: Mapping[str, Array] = field(default_factory=dict)
@@ -152,29 +150,25 @@ class State:
         velocity: Array,
         time: Array,
         path: Array | None,
-        contact: bool,
     ) -> State:
         """A state with another motion and all else shared; cheaper than `replace`."""
         new = object.__new__(State)
         new.__dict__.update(self.__dict__)
         new.__dict__["position"], new.__dict__["velocity"] = position, velocity
         new.__dict__["time"], new.__dict__["path"] = time, path
-        new.__dict__["contact"] = contact
         return new
 
-    def scatter(self, mask: Array, rows: State) -> State:
-        """A copy in which the worlds of ``mask`` (B,) hold ``rows``, in order."""
+    def scatter(self, worlds: Array, rows: State) -> State:
+        """A copy in which some worlds (W,), by index, hold ``rows``, in order."""
         arrays: dict[str, Any] = {}
         for name in (*ARRAYS, *(("path",) if self.path is not None else ())):
             arrays[name] = getattr(self, name).copy()
-            arrays[name][mask] = getattr(rows, name)
+            arrays[name][worlds] = getattr(rows, name)
         return replace(self, **arrays)
 
 
 ARRAYS = tuple(
-    f.name
-    for f in fields(State)
-    if f.name not in ("bodies", "contact", "path", "extra")
+    f.name for f in fields(State) if f.name not in ("bodies", "path", "extra")
 )
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import reduce
 
 import numpy as np
 
@@ -15,9 +14,10 @@ from marl_airhockey.backend import Backend, Command
 from marl_airhockey.draws import Draws
 from marl_airhockey.driver import Driver
 from marl_airhockey.episode import Episode, Step
-from marl_airhockey.limits import Excess, Reach, limits
+from marl_airhockey.limits import Reach, limits
 from marl_airhockey.observer import Observation, Observer
 from marl_airhockey.physics import Physics
+from marl_airhockey.referee import Referee, Verdict
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.seats import Driven
 from marl_airhockey.sensor import Delay, Sensor
@@ -52,6 +52,7 @@ class World:
         self.num_worlds = b = backend.num_worlds
         self.control_dt = dt = backend.control_dt
         horizon = round(scenario.seconds / dt)
+        self._limit = np.zeros(b, np.int64)
         self.max_cycles = horizon if max_cycles is None else max_cycles
         self.autoreset = autoreset
         seats = range(len(cast.seats))
@@ -59,6 +60,7 @@ class World:
         self.reach = Reach.of(cast.table, cast.seats)
         self._to_ego = np.array([cast.table.rotation(s.side) for s in cast.seats])
         self._straight = bool((self._to_ego == np.eye(2)).all())
+        self.referee = Referee(scenario, self._to_ego)
         self.sensor = Sensor(cast, b, physics, dt)
         self.observer = Observer(scenario, self.sensor, physics, observe)
         self.driven = [
@@ -90,6 +92,15 @@ class World:
     sent: Array
     """(B, seats, 2) what was sent in the last step, table frame, m/s"""
 
+    @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return int(self._limit[0])
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self._limit[:] = cycles
+
     def seed(self, seed: int) -> None:
         """Give world i the seed + i; takes effect at the next `reset`."""
         self._seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
@@ -107,52 +118,53 @@ class World:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
         if seed is not None:
             self.seed(seed)
-        everywhere = np.ones(self.num_worlds, np.bool_)
-        self.restart(everywhere)
+        self.restart(np.arange(self.num_worlds))
         return self.observation()
 
-    def restart(self, mask: Array) -> None:
-        """Begin a new episode in the worlds of a mask (B,)."""
-        episode, w = self.episode, int(mask.sum())
-        episode.number[mask] += 1
+    def restart(self, worlds: Array) -> None:
+        """Begin a new episode in some worlds, by index (W,)."""
+        episode = self.episode
+        episode.number[worlds] += 1
         for purpose, stream in self._streams.items():
-            stream.renew(mask, self._seeds, episode.number, purpose)
+            stream.renew(worlds, self._seeds, episode.number, purpose)
         if not episode.physics:
             episode.physics = self.physics.draw(self._streams["physics"])
-            self.backend.set_physics(episode.physics, np.ones_like(mask))
+            everywhere = np.ones(self.num_worlds, np.bool_)
+            self.backend.set_physics(episode.physics, everywhere)
         elif self.physics.varies:
-            drawn = self.physics.draw(self._streams["physics"].select(mask))
+            drawn = self.physics.draw(self._streams["physics"].select(worlds))
             for name, value in drawn.items():
-                episode.physics[name][mask] = value
-            self.backend.set_physics(episode.physics, mask)
-        rows, memory = self.scenario.start(self._streams["start"].select(mask), w)
-        self._place(mask, rows, memory)
-        for counter in (episode.cycles, episode.returns, episode.success):
-            counter[mask] = 0
-        episode.first_shot[mask] = False
-        self._pushed[mask] = 0.0
+                episode.physics[name][worlds] = value
+            self.backend.set_physics(episode.physics, self._mask(worlds))
+        draws = self._streams["start"].select(worlds)
+        self._place(worlds, *self.scenario.start(draws, len(worlds)))
+        for name in ("cycles", "returns", "success", "first_shot"):
+            setattr(episode, name, _merged(getattr(episode, name), worlds, 0))
+        self._pushed[worlds] = 0.0
         if self._delay is not None:
-            idle = np.zeros((w, self._delay.depth, *self._pushed.shape[1:]))
-            self._delay.fill(mask, idle)
-        self._sensed = self._look(mask)
+            idle = np.zeros((len(worlds), self._delay.depth, *self._pushed.shape[1:]))
+            self._delay.fill(worlds, idle)
+        self._sensed = self._look(worlds)
         for seat in self.driven:
-            seat.start(mask, self._seeds, episode.number)
+            seat.start(worlds, self._seeds, episode.number)
 
-    def _place(self, mask: Array, rows: State, memory: Memory) -> None:
-        """Put the worlds of a mask into rows of a state and a memory."""
-        self.backend.start(rows, mask)
-        if mask.all():
+    def _mask(self, worlds: Array) -> Array:
+        mask = np.zeros(self.num_worlds, np.bool_)
+        mask[worlds] = True
+        return mask
+
+    def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
+        """Put some worlds into rows of a state and a memory."""
+        self.backend.start(rows, self._mask(worlds))
+        if len(worlds) == self.num_worlds:
             self.state, self.memory = rows, memory
             return
-        self.state = replace(self.state, path=None).scatter(mask, rows)
-        merged = {}
-        for name, row in memory.items():
-            merged[name] = self.memory[name].copy()
-            merged[name][mask] = row
-        self.memory = merged
+        self.state = replace(self.state, path=None).scatter(worlds, rows)
+        old = self.memory
+        self.memory = {k: _merged(old[k], worlds, row) for k, row in memory.items()}
 
     def _look(self, starting: Array | None = None) -> State:
-        """Sense the state, beginning anew in the worlds of a mask."""
+        """Sense the state, beginning anew in some worlds, by index."""
         values, stream = self.episode.physics, self._streams["sensor"]
         if starting is None:
             return self.sensor.sense(self.state, values, stream)
@@ -172,36 +184,34 @@ class World:
         Raises:
             ValueError: a wrong shape, or an element that is not finite.
         """
-        values, before, old = self.episode.physics, self.state, self.memory
+        values, before = self.episode.physics, self.state
         asked, told = self._ask(actions)
         if self._delay is not None:
             asked = self._delay.push(asked, values["action_delay"])
-        speed = values["paddle_speed"]
         self.asked = asked
-        wanted = asked * speed[:, None, None]
         if not self._straight:
-            wanted = (wanted[..., None, :] @ self._to_ego)[..., 0, :]
-        sent, excess = limits(
-            wanted,
-            before.paddle,
-            before.paddle_velocity,
+            asked = (asked[..., None, :] @ self._to_ego)[..., 0, :]
+        sent, self._pushed, excess = limits(
+            asked,
+            before.position,
+            before.velocity,
             self._pushed,
             self.reach,
-            speed,
+            values["paddle_speed"],
             values["paddle_acceleration"],
             self.control_dt,
         )
         if told is not None:
             np.copyto(sent, told[..., 2:], where=np.isfinite(told[..., 2:]))
+            self._pushed = (sent - before.paddle_velocity) / self.control_dt
         self.sent = sent
         after = self.backend.step(Command(sent, told))
-        self._pushed = (sent - before.paddle_velocity) / self.control_dt
-        new = self.scenario.advance(old, before, sent, after)
-        terms = self.scenario.judge(before, sent, after, old, new)
-        terminated = self.scenario.ends(after, new)
-        self.state, self.memory = after, new
-        truncated, reward = self._count(terms, terminated)
-        result = self._report(terms, reward, terminated, truncated, sent, excess, speed)
+        verdict = self.referee.judge(
+            before, sent, after, self.memory, self.episode, self._limit
+        )
+        vars(self.episode).update(verdict.counters)
+        self.state, self.memory = after, verdict.memory
+        result = self._report(verdict, excess)
         self._go_on(result)
         return result
 
@@ -229,78 +239,67 @@ class World:
             told[:, seat.index, 2:] = place[:, 2:] @ turn
         return asked, told
 
-    def _count(self, terms: dict[str, Array], terminated: Array) -> tuple[Array, Array]:
-        """Update the counters; the truncations (B,) and rewards (B, seats)."""
-        episode = self.episode
-        episode.cycles += 1
-        truncated = (episode.cycles >= self.max_cycles) & ~terminated
-        reward = np.asarray(reduce(np.add, terms.values()))
-        episode.returns += reward
-        success = self.scenario.succeeds(self.state, self.memory)
-        if success.ndim == 1:
-            success = success[:, None]
-        if success.any():
-            fresh = success.any(-1) & ~episode.success.any(-1)
-            if fresh.any() and "touches" in self.memory:
-                few = self.memory["touches"].sum((-1, -2)) <= 1
-                episode.first_shot |= fresh & few
-            episode.success |= success
-        return truncated, reward
-
-    def _report(
-        self,
-        terms: dict[str, Array],
-        reward: Array,
-        terminated: Array,
-        truncated: Array,
-        sent: Array,
-        excess: Excess,
-        speed: Array,
-    ) -> Step:
-        turned = sent
-        if not self._straight:
-            turned = (self._to_ego @ sent[..., None])[..., 0]
-        fraction = turned / speed[:, None, None]
-        result = Step(
+    def _report(self, verdict: Verdict, excess: Array) -> Step:
+        outcome, episode, terms = verdict.outcome, self.episode, verdict.terms
+        reward, sent, cost = outcome["reward"], outcome["sent"], excess[..., -1]
+        success = episode.success
+        if self.driven:
+            rows = (reward, sent, cost, success)
+            reward, sent, cost, success = (x[:, self.open] for x in rows)
+            terms = {k: v[:, self.open] for k, v in terms.items()}
+        return Step(
             observation={},
             reward=reward,
-            terminated=terminated,
-            truncated=truncated,
+            terminated=outcome["terminated"],
+            truncated=outcome["truncated"],
             terms=terms,
-            sent=fraction.astype(np.float32),
+            sent=sent,
             excess=excess,
-            cost=excess.cost,
-            success=self.episode.success,
-            first_shot=self.episode.first_shot.copy(),
+            cost=cost,
+            success=success,
+            first_shot=episode.first_shot,
         )
-        if self.driven:
-            for name in ("reward", "sent", "cost", "success"):
-                setattr(result, name, getattr(result, name)[:, self.open])
-            result.terms = {k: v[:, self.open] for k, v in terms.items()}
-        else:
-            result.success = result.success.copy()
-        return result
 
     def _go_on(self, result: Step) -> None:
         """Serve again inside episodes, sense, and restart the worlds that ended."""
-        done = result.terminated | result.truncated
         self._sensed = self._look()
         served = self.scenario.restart(self._streams["serve"], self.state, self.memory)
         if served is not None:
             mask, rows, memory = served
+            done = result.terminated | result.truncated
             live = ~done[mask]
-            mask = mask & ~done
+            worlds = np.flatnonzero(mask & ~done)
             rows = rows.map(lambda x: x[live])
-            self._place(mask, rows, {k: v[live] for k, v in memory.items()})
-            self._sensed = self._look(mask)
+            self._place(worlds, rows, {k: v[live] for k, v in memory.items()})
+            self._sensed = self._look(worlds)
         result.observation = self.observation()
-        if self.autoreset and done.any():
+        if not self.autoreset:
+            return
+        worlds = np.flatnonzero(result.terminated | result.truncated)
+        if len(worlds):
             result.final_observation = result.observation
-            self.restart(done)
-            result.observation = self.observation()
+            self.restart(worlds)
+            result.observation = self._renewed(result.observation, worlds)
+
+    def _renewed(self, observation: Observation, worlds: Array) -> Observation:
+        """The observation with that of some worlds read anew."""
+        sensed = self._sensed.map(lambda x: x[worlds])
+        memory = {k: v[worlds] for k, v in self.memory.items()}
+        fresh = self.observer.read(sensed, memory, self.open, worlds=worlds)
+        if isinstance(observation, np.ndarray):
+            return _merged(observation, worlds, np.asarray(fresh))
+        rows = dict(fresh)
+        return {k: _merged(v, worlds, rows[k]) for k, v in observation.items()}
 
     def close(self) -> None:
         """Close the backend and leave the drivers."""
         self.backend.close()
         for seat in self.driven:
             seat.driver.__exit__(None, None, None)
+
+
+def _merged(array: Array, worlds: Array, rows: Array | int) -> Array:
+    """A copy in which some worlds, by index, hold ``rows``."""
+    merged = array.copy()
+    merged[worlds] = rows
+    return merged

@@ -47,12 +47,10 @@ class Juggle(Scenario):
     def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
-        armed, struck_at = memory["armed"], memory["struck_at"]
-        if after.contact:
-            height = rewards.contact_height(before, after)
-            struck = ~np.isnan(height)
-            struck_at = np.where(struck, height, struck_at)
-            armed = np.where(struck, 1.0, armed)
+        height = rewards.contact_height(before, after)
+        struck = ~np.isnan(height)
+        struck_at = np.where(struck, height, memory["struck_at"])
+        armed = np.where(struck, 1.0, memory["armed"])
         risen = (armed > 0) & (after.puck[..., 0] >= struck_at + self.lift)
         return {
             "armed": np.where(risen, 0.0, armed),

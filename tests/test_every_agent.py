@@ -46,7 +46,7 @@ def test_it_plays_both_ends_alike(agent):
     for name in ("position", "velocity"):
         turned = -getattr(near.state, name)
         getattr(flipped, name)[:] = turned[:, [1, 0, 2]]
-    everywhere = np.ones(3, bool)
+    everywhere = np.arange(3)
     far._place(everywhere, flipped, far.memory)
     far._sensed = far._look(everywhere)
     for world, seat in ((near, 0), (far, 1)):

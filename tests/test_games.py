@@ -31,8 +31,8 @@ def mirrored(world):
         getattr(turned, name)[:] = -getattr(world.state, name)[:, [1, 0, 2]]
     other = ah.make_world(Pair(), world.num_worlds)
     other.reset(0)
-    other._place(np.ones(world.num_worlds, bool), turned, other.memory)
-    other._sensed = other._look(np.ones(world.num_worlds, bool))
+    other._place(np.arange(world.num_worlds), turned, other.memory)
+    other._sensed = other._look(np.arange(world.num_worlds))
     return other
 
 

@@ -11,10 +11,11 @@ PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
 LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
-    | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"},
+    | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
+    | {"symbols", "loops", "fuse"},
     {"backends", "chipmunk", "space", "registry", "registration"},
     {"sensor", "observer", "seats", "canvas", "pixels", "render", "window"}
-    | {"episode", "world"},
+    | {"episode", "referee", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
     {"match", "film", "catalogue", "learn", "cli"},
 )

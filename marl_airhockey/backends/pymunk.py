@@ -28,12 +28,15 @@ class Pymunk(Backend):
         self.spaces = [Space(cast, control_dt, substeps, row) for row in self._flags]
         self._worlds = np.array([s.addresses for s in self.spaces], np.int64)
         self._drifts = AVAILABLE and len(cast.seats) == 1
-        mouths = len(cast.mouths)
-        self.state = still_state(cast.bodies, num_worlds, mouths)
+        self.state = still_state(cast.bodies, num_worlds, len(cast.mouths))
+        self._quiet = self.state
         self._steps = np.zeros(num_worlds, np.int64)
-        self._kicks = np.zeros((num_worlds, 1, 1))
+        self._kicks = np.zeros((num_worlds, len(cast.bodies)))
         self._never = np.zeros((num_worlds, len(cast.seats)), np.bool_)
-        self._quiet = still_state(cast.bodies, num_worlds, mouths)
+        self._eventful: list[int] = []
+        """Worlds in which something touched or crossed at the end of the last step."""
+        moments = substeps + 1 if cast.path else 0
+        self._moments = (num_worlds, moments, cast.bodies.movers, 4)
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
 
     @classmethod
@@ -46,46 +49,37 @@ class Pymunk(Backend):
         for i in np.flatnonzero(mask):
             row = {name: float(value[i]) for name, value in values.items()}
             self.spaces[i].set_physics(row)
-            self._kicks[i] = self.spaces[i].kick
+            self._kicks[i, self.cast.bodies.puck] = self.spaces[i].kick
 
     def start(self, state: State, mask: Array) -> None:
-        everywhere = len(state.time) == self.num_worlds
-        self.state = state if everywhere else self.state.scatter(mask, state)
-        for row, i in enumerate(np.flatnonzero(mask)):
+        worlds = np.flatnonzero(mask)
+        everywhere = len(worlds) == self.num_worlds
+        self.state = state if everywhere else self.state.scatter(worlds, state)
+        for row, i in enumerate(worlds):
             position, velocity = state.position[row], state.velocity[row]
             self.spaces[i].start(position, velocity, state.angle[row])
+        self._eventful = sorted({*self._eventful, *worlds.tolist()})
         self._steps[mask] = np.round(state.time / self.control_dt).astype(np.int64)
 
     def step(self, command: Command) -> State:
-        old, bodies, s = self.state, self.cast.bodies, len(self.cast.seats)
-        position = old.position[:, :s].copy()
-        velocity = old.velocity[:, :s].copy()
-        goal, told, lifted = command.velocity, self._never, None
+        old, goal, told, lifted = self.state, command.velocity, self._never, None
+        position, velocity = old.position.copy(), old.velocity.copy()
+        path = np.empty(self._moments)
         if command.told is not None:
             goal, told, lifted = self._follow(position, command.told, goal)
-        moments = self.substeps + 1 if self.cast.path else 1
-        ways = np.empty((self.num_worlds, moments, bodies.movers, 4))
-        path, rows = ways if self.cast.path else None, ways[:, -1]
-        flags = self._flags
-        for i in flags[:, EVENT].nonzero()[0].tolist():
+        for i in self._eventful:
             self.spaces[i].begin()
-        for i in self._drift(velocity, goal, lifted is not None, ways):
-            way, space = None if path is None else path[i], self.spaces[i]
-            space.step(position[i], velocity[i], goal[i], told[i], way)
-            rows[i] = space.read()
-        eventful = flags[:, EVENT].nonzero()[0].tolist()
-        rows[:, :s, 2:] = velocity
-        ways[:, :, bodies.puck, 2] += self._kicks
+        for i in self._drift(goal, lifted is not None, position, velocity, path):
+            self._finish(i, goal[i], told[i], position[i], velocity[i], path[i])
         self._steps += 1
-        place, speed = rows[..., :2], rows[..., 2:]
-        if len(bodies) > bodies.movers:
-            place = np.concatenate([place, old.position[:, bodies.movers :]], 1)
-            speed = np.concatenate([speed, old.velocity[:, bodies.movers :]], 1)
+        time = self._steps * self.control_dt
+        if self.cast.path:
+            path[..., 2] += self._kicks[:, None, : path.shape[2]]
         new = self._quiet.moved(
-            place, speed, self._steps * self.control_dt, path, bool(eventful)
+            position, velocity, time, path if self.cast.path else None
         )
-        if eventful:
-            new = self._with_events(new, eventful)
+        if self._eventful:
+            new = self._with_events(new, self._eventful)
         if command.told is not None:
             self._land(new, command.told, lifted)
         if self._turns:
@@ -94,27 +88,43 @@ class Pymunk(Backend):
         return new
 
     def _drift(
-        self, velocity: Array, goal: Array, any_told: bool, ways: Array
+        self, goal: Array, any_told: bool, position: Array, velocity: Array, path: Array
     ) -> list[int]:
         """Step the quiet worlds in compiled code; those that Python must finish."""
-        flags = self._flags
+        flags, self._eventful = self._flags, []
         if not self._drifts or any_told:
             flags[:, SUBSTEP] = -1
             return list(range(self.num_worlds))
-        sim_dt = self.control_dt / self.substeps
-        start = velocity[:, 0].copy()
-        end = goal[:, 0]
-        drift(self._worlds, start, end, sim_dt, self.substeps, flags, ways)
-        left: list[int] = flags[:, EVENT].nonzero()[0].tolist()
-        velocity[:, 0] = goal[:, 0]
-        for i in left:
-            velocity[i, 0] = start[i]
-        return left
+        dt, n = self.control_dt / self.substeps, self.substeps
+        left = drift(
+            self._worlds, goal, self._kicks, dt, n, flags, position, velocity, path
+        )
+        return flags[:, EVENT].nonzero()[0].tolist() if left else []
+
+    def _finish(
+        self,
+        i: int,
+        goal: Array,
+        told: Array,
+        position: Array,
+        velocity: Array,
+        path: Array,
+    ) -> None:
+        """Step a world to the end of the control step, in place."""
+        space, seats = self.spaces[i], len(goal)
+        paddles, speeds = position[:seats].copy(), velocity[:seats].copy()
+        space.step(paddles, speeds, goal, told, path if self.cast.path else None)
+        rows = space.read()
+        position[: len(rows)], velocity[: len(rows)] = rows[:, :2], rows[:, 2:]
+        velocity[: len(rows), 0] += self._kicks[i, : len(rows)]
+        velocity[:seats] = speeds
+        if self._flags[i, EVENT]:
+            self._eventful.append(i)
 
     def _with_events(self, state: State, worlds: list[int]) -> State:
         """The state with the contacts and crossings of some worlds."""
-        quiet, names = self._quiet, ("touched", "touched_at", "touching", "crossed")
-        arrays = {n: getattr(quiet, n).copy() for n in (*names, "crossed_velocity")}
+        names = ("touched", "touched_at", "touching", "crossed", "crossed_velocity")
+        arrays = {name: getattr(self._quiet, name).copy() for name in names}
         puck = self.cast.bodies.puck.start
         for i in worlds:
             space = self.spaces[i]
@@ -130,7 +140,8 @@ class Pymunk(Backend):
     ) -> tuple[Array, Array, Array]:
         """Velocities, who is told and who is lifted, for a command with told seats."""
         is_told = np.asarray(np.isfinite(told).all(-1))
-        way = (told[..., :2] - position) / self.control_dt
+        way = told[..., :2] - position[:, : told.shape[1]]
+        way /= self.control_dt
         lifted = is_told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
         for i, k in zip(*np.nonzero(lifted), strict=True):
             self.spaces[i].lift(int(k), True)

@@ -1,0 +1,154 @@
+"""Pure numpy functions over worlds, compiled into one loop over the worlds.
+
+Scenarios and views are written for arrays (..., *) whose leading axes are the caller's.
+So they can be run once on symbols of a single world (`symbols`), and what they did is
+compiled by numba: no temporaries, and no price of a numpy call for every operation.
+Code that cannot be traced runs as it is, with a warning that says why.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.loops import Writer, load
+from marl_airhockey.state import Array
+from marl_airhockey.symbols import Symbol, Tape
+
+Source = Mapping[str, Any]
+"""Named arrays (B, *), and other things that do not differ between worlds."""
+Sink = dict[str, Array]
+"""Named arrays (B, *)."""
+Function = Callable[..., tuple[Sink, ...]]
+"""Takes sources and gives sinks, leading axes being the caller's."""
+
+POOL = 64
+"""Rows of every output that are made at once: numpy hands out rows of an array faster
+than new arrays."""
+
+
+class Fused:
+    """A function of named arrays over worlds, compiled at its first call.
+
+    Args:
+        function: pure; takes mappings and gives mappings of arrays (..., *).
+        name: of what it does, for warnings.
+    """
+
+    def __init__(self, function: Function, name: str) -> None:
+        self._function, self._name = function, name
+        self._plan: _Plan | None = None
+        self.refused: str | None = None
+        """Why it runs as plain numpy, if it does."""
+
+    def __call__(self, *sources: Source) -> tuple[Sink, ...]:
+        """The sinks, for all worlds of the sources."""
+        if self._plan is not None:
+            return self._plan(sources)
+        plain = self._function(*sources)
+        if self.refused is not None:
+            return plain
+        try:
+            plan = _Plan(self._function, sources, plain)
+            done = plan(sources)
+            _compare(done, plain)
+        except Exception as error:
+            self.refused = f"{type(error).__name__}: {error}"
+            warnings.warn(
+                f"{self._name} runs as plain numpy, which is slower, because it could "
+                f"not be compiled ({self.refused})",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+            return plain
+        self._plan = plan
+        return done
+
+
+class _Plan:
+    """A traced function, compiled, with fresh output arrays for every call."""
+
+    def __init__(
+        self, function: Function, sources: tuple[Source, ...], plain: tuple[Sink, ...]
+    ) -> None:
+        tape = Tape()
+        arrays: dict[tuple[int, str], Array] = {}
+        symbolic = []
+        for i, source in enumerate(sources):
+            row = dict(source)
+            for key, value in source.items():
+                if isinstance(value, np.ndarray):
+                    arrays[i, key] = value
+                    row[key] = tape.array((i, key), value[0])
+            symbolic.append(row)
+        writer = Writer(tape, {name: a.dtype for name, a in arrays.items()})
+        self._blank: list[tuple[tuple[int, ...], Any]] = []
+        for sink, real in zip(function(*symbolic), plain, strict=True):
+            writer.begin_sink()
+            for key, out in sink.items():
+                place = np.asarray(out).astype(object)
+                shape, dtype = real[key].shape[1:], real[key].dtype
+                if place.shape != shape:
+                    raise ValueError(f"{key} has shape {place.shape} in a single world")
+                name = _as_it_was(place)
+                if name is not None and arrays[name].shape[1:] == shape:
+                    writer.keep(key, name)
+                else:
+                    writer.store(key, place, dtype)
+                    self._blank.append((shape, dtype))
+        self._count = next(iter(arrays))
+        self._kernel, self._call = load(writer.source(len(sources)))
+        self._pool: list[tuple[Array, ...]] = []
+        self._pooled = 0
+        self._strided = False
+        """Whether some array is not laid out row behind row and must be copied."""
+
+    def __call__(self, sources: tuple[Source, ...]) -> tuple[Sink, ...]:
+        """Call the loop."""
+        i, key = self._count
+        outputs = self._outputs(len(sources[i][key]))
+        if self._strided:
+            return self._call(self._copying, outputs, *sources)
+        try:
+            return self._call(self._kernel, outputs, *sources)
+        except TypeError:
+            self._strided = True
+            return self._call(self._copying, outputs, *sources)
+
+    def _copying(self, *arrays: Array) -> None:
+        self._kernel(*[np.ascontiguousarray(a) for a in arrays])
+
+    def _outputs(self, worlds: int) -> tuple[Array, ...]:
+        """Fresh output arrays; for few worlds many calls' worth are made at once."""
+        if worlds != self._pooled:
+            self._pool, self._pooled = [], worlds
+        if not self._pool:
+            calls = max(1, POOL // worlds)
+            blocks = [np.empty((calls, worlds, *s), kind) for s, kind in self._blank]
+            self._pool = list(zip(*blocks, strict=True))
+        return self._pool.pop()
+
+
+def _as_it_was(place: Array) -> tuple[int, str] | None:
+    """The name of the input that an output is, unchanged."""
+    names: set[tuple[int, str]] = set()
+    for index in np.ndindex(place.shape):
+        symbol = place[index]
+        if not isinstance(symbol, Symbol) or symbol.op != "input":
+            return None
+        name, where = symbol.args
+        if where != index:
+            return None
+        names.add(name)
+    return names.pop() if len(names) == 1 else None
+
+
+def _compare(done: tuple[Sink, ...], plain: tuple[Sink, ...]) -> None:
+    """Refuse a loop that does not compute what numpy computed."""
+    for mine, real in zip(done, plain, strict=True):
+        for key, array in real.items():
+            if not np.allclose(mine[key], array, 1e-5, 1e-6, equal_nan=True):
+                raise ValueError(f"{key} differs from what numpy makes of it")
