@@ -25,6 +25,7 @@ class Bench:
     def __init__(self, backend, physics=None, pucks=1, table=TABLE, **cast):
         self.cast = Cast(table, (make_seat("robot", table, 0),), pucks=pucks, **cast)
         kind = find_backend(backend)
+        self.refused = kind.supports(self.cast)
         self.backend = kind(self.cast, 1, DT, kind.default_substeps)
         values = {name: p.default for name, p in PARAMETERS.items()}
         values.update({"tilt": 0.0, "puck_damping": 0.0}, **(physics or {}))
@@ -139,6 +140,9 @@ def test_the_closed_form_of_banks_agrees(backend):
 @pytest.mark.parametrize("shape", ["disc", "square"])
 def test_blocks_of_both_shapes_are_moved_and_stop(backend, shape):
     bench = Bench(backend, blocks=1, block_shape=shape)
+    if bench.refused:
+        assert "pymunk" in bench.refused
+        return
     bench.start((-0.7, 0.0), (0.0, 0.012, 1.5, 0.0), (0.3, 0.0, 0.0, 0.0))
     states = bench.run(2.0)
     assert 0.02 < states[-1].block[0, 0, 0] - 0.3 < 0.5

@@ -1,0 +1,110 @@
+"""The 2D table for thousands of worlds at once: one compiled loop (`kernel`)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from marl_airhockey.backend import TOLD_SPEED, Backend, Command
+from marl_airhockey.cast import Cast
+from marl_airhockey.kernel import LAWS, Events, Ground, Motion, Order, advance, laws
+from marl_airhockey.rails import sides
+from marl_airhockey.state import Array, State, still_state
+from marl_airhockey.table import GRAVITY
+
+
+class Batched(Backend):
+    """B worlds as rows of arrays, stepped by numba."""
+
+    exact: ClassVar[bool] = True
+    default_substeps: ClassVar[int] = 10
+
+    def __init__(
+        self, cast: Cast, num_worlds: int, control_dt: float, substeps: int
+    ) -> None:
+        super().__init__(cast, num_worlds, control_dt, substeps)
+        bodies = cast.bodies
+        mouths = [(mouth.side, mouth.width is None) for mouth in cast.mouths]
+        obstacles = [(*o.start, *(o.end or o.start), o.radius) for o in cast.obstacles]
+        self._ground = Ground(
+            bodies.paddles,
+            bodies.pucks,
+            bodies.blocks,
+            np.array(bodies.radius),
+            sides(cast),
+            np.array(mouths, np.int64).reshape(-1, 2),
+            np.array(obstacles, np.float64).reshape(-1, 5),
+            control_dt,
+            substeps,
+        )
+        self._laws = np.zeros((num_worlds, LAWS))
+        self._quiet = self.state = still_state(bodies, num_worlds, len(mouths))
+        self._leaning = np.zeros((num_worlds, bodies.pucks, len(mouths)), np.bool_)
+        self._out = np.zeros((num_worlds, bodies.pucks), np.bool_)
+        self._never = np.zeros((num_worlds, bodies.paddles), np.bool_)
+        moments = substeps + 1 if cast.path else 0
+        self._moments = (num_worlds, moments, bodies.movers, 4)
+
+    @classmethod
+    def supports(cls, cast: Cast) -> str | None:
+        if cast.blocks and cast.block_shape != "disc":
+            return 'square blocks are played by backend "pymunk"'
+        if cast.blocks and any(mouth.width for mouth in cast.mouths):
+            return "blocks could slide into a goal mouth; leave out one or the other"
+        return None
+
+    def set_physics(self, values: dict[str, Array], mask: Array) -> None:
+        rows = {name: value[mask] for name, value in values.items()}
+        rows["pull"] = GRAVITY * np.sin(np.radians(rows["tilt"]))
+        self._laws[mask] = laws(rows, self.control_dt, self.substeps)
+
+    def start(self, state: State, mask: Array) -> None:
+        worlds = np.flatnonzero(mask)
+        everywhere = len(worlds) == self.num_worlds
+        self.state = state if everywhere else self.state.scatter(worlds, state)
+        self._leaning[worlds] = False
+        self._out[worlds] = False
+
+    def step(self, command: Command) -> State:
+        old, quiet = self.state, self._quiet
+        goal, told, lifted = command.velocity, self._never, self._never
+        if command.told is not None:
+            told = np.asarray(np.isfinite(command.told).all(-1))
+            way = command.told[..., :2] - old.paddle
+            way /= self.control_dt
+            goal = np.where(told[..., None], way, goal)
+            lifted = told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
+        position, velocity = old.position.copy(), old.velocity.copy()
+        path = np.empty(self._moments)
+        events = Events(
+            quiet.touched.copy(),
+            quiet.touched_at.copy(),
+            old.touching.copy(),
+            quiet.crossed.copy(),
+            quiet.crossed_velocity.copy(),
+            self._leaning,
+            self._out,
+        )
+        order = Order(goal, told, lifted)
+        motion = Motion(position, velocity, path)
+        advance(self._ground, self._laws, order, motion, events)
+        if command.told is not None:
+            velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
+        self.state = replace(
+            quiet,
+            position=position,
+            velocity=velocity,
+            touched=events.touched,
+            touched_at=events.touched_at,
+            touching=events.touching,
+            crossed=events.crossed,
+            crossed_velocity=events.crossed_velocity,
+            time=old.time + self.control_dt,
+            path=path if self.cast.path else None,
+        )
+        return self.state
+
+
+make = Batched

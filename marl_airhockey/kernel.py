@@ -1,0 +1,406 @@
+"""The batched 2D table: one control step of B worlds in one compiled loop.
+
+A world in which nothing can meet within the step coasts through it in closed form; any
+other is stepped substep by substep (`discs`). Both give the same numbers but for
+rounding, so that most steps cost a few distances.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.discs import (
+    bounce,
+    cap,
+    meet_disc,
+    meet_obstacle,
+    meet_side,
+    rub,
+    take_back,
+    through,
+)
+from marl_airhockey.paddles import meet
+from marl_airhockey.physics import PUCK_SPEED_CAP
+from marl_airhockey.rails import SQUEEZE, slip, wall
+from marl_airhockey.state import Array
+
+FALL, FADE, COAST_FADE, COAST_FALL, COAST_WAY, COAST_DROP = range(6)
+WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, GRIP = range(6, 12)
+LAWS = 12
+"""Columns of a world's laws: what a substep takes from a puck's vx (m/s) and leaves of
+its speed (1); the same for a whole step and its way (s) and drop (m); restitutions,
+masses (kg) and what friction takes from a block in a substep (m/s)."""
+
+
+def laws(values: dict[str, Array], control_dt: float, substeps: int) -> Array:
+    """(B, LAWS) from physical parameters (B,) each, ``pull`` (m/s2) among them."""
+    dt = control_dt / substeps
+    fall, fade = values["pull"] * dt, np.exp(-values["puck_damping"] * dt)
+    # x and v are linear in the first v: the sums of substeps with v = 1 and v = 0.
+    speed, drop = np.ones_like(fall), np.zeros_like(fall)
+    way, lost = np.zeros_like(fall), np.zeros_like(fall)
+    for _ in range(substeps):
+        way, lost = way + speed * dt, lost + drop * dt
+        speed, drop = speed * fade, drop * fade - fall
+    names = ("wall_restitution", "paddle_restitution", "block_restitution")
+    rest = [values[n] for n in (*names, "puck_mass", "block_mass")]
+    grip = values["block_friction"] * dt
+    return np.stack([fall, fade, speed, drop, way, lost, *rest, grip], axis=-1)
+
+
+class Ground(NamedTuple):
+    """What all worlds of a batch share."""
+
+    paddles: int
+    pucks: int
+    blocks: int
+    radius: Array
+    """(N,) m"""
+    lines: Array
+    """`rails.sides`"""
+    mouths: Array
+    """(M, 2) side of each mouth, and 1 if it is that whole side"""
+    obstacles: Array
+    """(O, 5) see `discs.meet_obstacle`"""
+    control_dt: float
+    """s"""
+    substeps: int
+
+
+class Order(NamedTuple):
+    """What the paddles of B worlds do in a step."""
+
+    goal: Array
+    """(B, paddles, 2) m/s at the end of the step; of a told one, all along"""
+    told: Array
+    """(B, paddles) moves at its velocity and does not yield"""
+    lifted: Array
+    """(B, paddles) touches nothing"""
+
+
+class Motion(NamedTuple):
+    """Where everything is and goes: changed in place."""
+
+    position: Array
+    """(B, N, 2) m"""
+    velocity: Array
+    """(B, N, 2) m/s"""
+    path: Array
+    """(B, substeps + 1, movers, 4) x, y, vx, vy, or (B, 0, movers, 4) if not wanted"""
+
+
+class Events(NamedTuple):
+    """What happened to pucks, and what outlasts a step: changed in place."""
+
+    touched: Array
+    """(B, paddles, pucks) see `State`, as the next four"""
+    touched_at: Array
+    touching: Array
+    crossed: Array
+    crossed_velocity: Array
+    leaning: Array
+    """(B, pucks, M) whether a puck touches the wall that is a mouth"""
+    out: Array
+    """(B, pucks) whether a puck is out of play"""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def advance(
+    ground: Ground, law: Array, order: Order, motion: Motion, events: Events
+) -> None:
+    """Move B worlds by a control step, in place; ``law`` is (B, LAWS)."""
+    busy = np.ones(len(law), np.bool_)
+    if motion.path.shape[1] == 0:
+        _find_busy(ground, law, order, motion, events, busy)
+        _coast(ground, law, order, motion, events, busy)
+    _substeps(ground, law, order, motion, events, busy)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _find_busy(
+    ground: Ground,
+    law: Array,
+    order: Order,
+    motion: Motion,
+    events: Events,
+    busy: Array,
+) -> None:
+    """In which worlds bodies may meet anything within the step.
+
+    A body stays within a disc about its place, of the way that it can go at most.
+    """
+    paddles, pucks, blocks, radius, lines, _, obstacles, control_dt, n = ground
+    position, velocity, goal, out = (
+        motion.position,
+        motion.velocity,
+        order.goal,
+        events.out,
+    )
+    first, movers = paddles + pucks, paddles + pucks + blocks
+    way = np.zeros(movers)
+    for b in range(len(law)):
+        met, fall = False, law[b, FALL] * n
+        for i in range(movers):
+            vx, vy = velocity[b, i, 0], velocity[b, i, 1]
+            most, extra = vx * vx + vy * vy, 0.0
+            if i < paddles:
+                gx, gy = goal[b, i, 0], goal[b, i, 1]
+                most = max(most, gx * gx + gy * gy)
+            elif i < first:
+                # A puck out of play meets nothing.
+                extra = -np.inf if out[b, i - paddles] else fall
+            else:
+                met |= most > 0.0 or law[b, FALL] > law[b, GRIP]
+            way[i] = radius[i] + (np.sqrt(most) + extra) * control_dt
+        for i in range(paddles, first):
+            x, y = position[b, i, 0], position[b, i, 1]
+            for s in range(len(lines)):
+                met |= lines[s, 0] * x + lines[s, 1] * y + lines[s, 2] < way[i]
+            for o in range(len(obstacles)):
+                met |= meet_obstacle(x, y, way[i], obstacles, o)[0] > 0.0
+        for i in range(first):
+            for j in range(i + 1, movers):
+                dx = position[b, j, 0] - position[b, i, 0]
+                dy = position[b, j, 1] - position[b, i, 1]
+                reach = max(way[i] + way[j], 0.0)
+                met |= dx * dx + dy * dy < reach * reach
+        busy[b] = met
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _coast(
+    ground: Ground,
+    law: Array,
+    order: Order,
+    motion: Motion,
+    events: Events,
+    busy: Array,
+) -> None:
+    """The others in closed form: paddles on their ramps, pucks in free flight."""
+    paddles, pucks, _, _, _, mouths, _, control_dt, _ = ground
+    position, velocity, goal = motion.position, motion.velocity, order.goal
+    touching, leaning, out = events.touching, events.leaning, events.out
+    for b in range(len(law)):
+        if busy[b]:
+            continue
+        for i in range(paddles):
+            for axis in range(2):
+                start = velocity[b, i, axis]
+                start = goal[b, i, axis] if order.told[b, i] else start
+                mean = 0.5 * (start + goal[b, i, axis])
+                position[b, i, axis] += mean * control_dt
+                velocity[b, i, axis] = goal[b, i, axis]
+        kick = 0.5 * law[b, FALL]
+        for k in range(pucks):
+            i = paddles + k
+            for j in range(paddles):
+                touching[b, j, k] = False
+            for m in range(len(mouths)):
+                leaning[b, k, m] = False
+            if out[b, k]:
+                velocity[b, i, 0] = velocity[b, i, 1] = 0.0
+                continue
+            vx, vy = velocity[b, i, 0] - kick, velocity[b, i, 1]
+            position[b, i, 0] += law[b, COAST_WAY] * vx + law[b, COAST_DROP]
+            position[b, i, 1] += law[b, COAST_WAY] * vy
+            velocity[b, i, 0] = law[b, COAST_FADE] * vx + law[b, COAST_FALL] + kick
+            velocity[b, i, 1] = law[b, COAST_FADE] * vy
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _substeps(
+    ground: Ground,
+    law: Array,
+    order: Order,
+    motion: Motion,
+    events: Events,
+    busy: Array,
+) -> None:
+    """The busy worlds, substep by substep.
+
+    The inner functions are one phase of a substep each; numba puts them in place, which
+    spares it counting references to a dozen arrays at every call.
+    """
+    paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, n = ground
+    goal, told, lifted = order
+    position, velocity, path = motion
+    touched, touched_at, touching, crossed, crossed_velocity, leaning, out = events
+    first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
+    # Of one world: places, velocities, those before this substep's forces, ways that
+    # take overlaps back; ramped is what a paddle's velocity has become.
+    p, v = np.zeros((movers, 2)), np.zeros((movers, 2))
+    was, push = np.zeros((movers, 2)), np.zeros((movers, 2))
+    ramped = np.zeros((paddles, 2))
+    weight, spring = np.zeros(movers), np.ones(movers)
+    away, awake = np.zeros(movers, np.bool_), np.zeros(movers, np.bool_)
+
+    def begin(b: int, kick: float) -> None:
+        for i in range(movers):
+            for axis in range(2):
+                p[i, axis], v[i, axis] = position[b, i, axis], velocity[b, i, axis]
+                push[i, axis] = 0.0
+            if i < paddles:
+                spring[i], away[i] = law[b, PADDLE], lifted[b, i]
+                for axis in range(2):
+                    here, there = v[i, axis], goal[b, i, axis]
+                    ramped[i, axis] = there if told[b, i] else here
+            elif i < first:
+                weight[i], away[i] = 1.0 / law[b, PUCK_MASS], out[b, i - paddles]
+                # Half a substep ahead of what is reported (leapfrog).
+                v[i, 0] -= kick
+            else:
+                weight[i], spring[i] = 1.0 / law[b, BLOCK_MASS], law[b, BLOCK]
+
+    def drive(b: int, left: int) -> None:
+        for i in range(paddles):
+            for axis in range(2):
+                ramp = (goal[b, i, axis] - ramped[i, axis]) / left
+                v[i, axis] = ramped[i, axis] + 0.5 * ramp
+                p[i, axis] += v[i, axis] * dt
+                ramped[i, axis] += ramp
+        if paddles > 1 and meet(p, ramped, told[b], 2 * radius[0]):
+            for i in range(paddles):
+                v[i, 0], v[i, 1] = ramped[i, 0], ramped[i, 1]
+
+    def move(b: int) -> None:
+        fade, fall = law[b, FADE], law[b, FALL]
+        for i in range(movers):
+            was[i, 0], was[i, 1] = v[i, 0], v[i, 1]
+            awake[i] = i < first or v[i, 0] != 0.0 or v[i, 1] != 0.0
+            if i >= paddles and not away[i]:
+                for axis in range(2):
+                    p[i, axis] += v[i, axis] * dt + push[i, axis]
+                    push[i, axis] = 0.0
+                v[i, 0], v[i, 1] = v[i, 0] * fade - fall, v[i, 1] * fade
+
+    def meet_fixed(b: int) -> None:
+        for i in range(paddles, movers):
+            if away[i] or not awake[i]:
+                continue
+            x, y, rest = p[i, 0], p[i, 1], law[b, WALL] * spring[i]
+            for c in range(len(lines) + len(obstacles)):
+                if c < len(lines):
+                    depth, nx, ny = meet_side(x, y, radius[i], lines, c)
+                else:
+                    o = c - len(lines)
+                    depth, nx, ny = meet_obstacle(x, y, radius[i], obstacles, o)
+                if depth > 0.0:
+                    before = nx * was[i, 0] + ny * was[i, 1]
+                    gain = bounce(before, nx * v[i, 0] + ny * v[i, 1], rest)
+                    back = take_back(depth, nx * push[i, 0] + ny * push[i, 1])
+                    v[i, 0] += gain * nx
+                    v[i, 1] += gain * ny
+                    push[i, 0] += back * nx
+                    push[i, 1] += back * ny
+
+    def cross(b: int, kick: float) -> None:
+        for m in range(len(mouths)):
+            s, whole = mouths[m, 0], mouths[m, 1] == 1
+            for k in range(pucks):
+                i = paddles + k
+                x, y = p[i, 0], p[i, 1]
+                if away[i]:
+                    continue
+                if whole:
+                    leans = meet_side(x, y, radius[i], lines, s)[0] > 0.0
+                    began = leans and not leaning[b, k, m]
+                    leaning[b, k, m] = leans
+                else:
+                    began = through(x, y, lines, s)
+                    out[b, k] = away[i] = began
+                if began:
+                    crossed[b, k, m] = True
+                    crossed_velocity[b, k, m, 0] = was[i, 0] + kick
+                    crossed_velocity[b, k, m, 1] = was[i, 1]
+
+    def meet_each_other(b: int, time: float) -> None:
+        for i in range(movers - 1):
+            for j in range(max(i + 1, paddles), movers):
+                depth, nx, ny = -1.0, 1.0, 0.0
+                if (awake[i] or awake[j]) and not (away[i] or away[j]):
+                    dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
+                    depth, nx, ny = meet_disc(dx, dy, radius[i] + radius[j])
+                if i < paddles and j < first:
+                    k, meets = j - paddles, depth > 0.0
+                    if meets and not touching[b, i, k]:
+                        touched[b, i, k] += 1
+                        touched_at[b, i, k] = time
+                    touching[b, i, k] = meets
+                if depth <= 0.0:
+                    continue
+                share = weight[i] / (weight[i] + weight[j])
+                other = 1.0 - share
+                before = nx * (was[j, 0] - was[i, 0]) + ny * (was[j, 1] - was[i, 1])
+                now = nx * (v[j, 0] - v[i, 0]) + ny * (v[j, 1] - v[i, 1])
+                taken = nx * (push[j, 0] - push[i, 0]) + ny * (push[j, 1] - push[i, 1])
+                gain = bounce(before, now, spring[i] * spring[j])
+                back = take_back(depth, taken)
+                v[i, 0] -= gain * share * nx
+                v[i, 1] -= gain * share * ny
+                v[j, 0] += gain * other * nx
+                v[j, 1] += gain * other * ny
+                push[i, 0] -= back * share * nx
+                push[i, 1] -= back * share * ny
+                push[j, 0] += back * other * nx
+                push[j, 1] += back * other * ny
+
+    def settle(b: int, kick: float) -> None:
+        for i in range(paddles, movers):
+            if i >= first:
+                speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+                share = rub(speed, law[b, GRIP])
+                v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
+                continue
+            vx, vy = v[i, 0] + kick, v[i, 1]
+            share = cap(np.sqrt(vx * vx + vy * vy), PUCK_SPEED_CAP)
+            if share < 1.0:
+                v[i, 0], v[i, 1] = share * vx - kick, share * vy
+            if wall(lines, radius[i], p[i, 0], p[i, 1], SQUEEZE) >= 0:
+                held = False
+                for j in range(paddles):
+                    held |= touching[b, j, i - paddles]
+                    held |= touched[b, j, i - paddles] > 0
+                if held:
+                    touch = radius[0] + radius[i]
+                    x, y = slip(lines, radius[i], p[i, 0], p[i, 1], p[:paddles], touch)
+                    p[i, 0], p[i, 1] = x, y
+                    push[i, 0] = push[i, 1] = 0.0
+
+    def record(b: int, moment: int, kick: float) -> None:
+        for i in range(path.shape[2]):
+            for axis in range(2):
+                path[b, moment, i, axis] = p[i, axis]
+                speed = ramped[i, axis] if i < paddles else v[i, axis]
+                path[b, moment, i, 2 + axis] = speed
+            path[b, moment, i, 2] += kick if paddles <= i < first else 0.0
+
+    def finish(b: int, kick: float) -> None:
+        for i in range(movers):
+            for axis in range(2):
+                speed = ramped[i, axis] if i < paddles else v[i, axis]
+                position[b, i, axis], velocity[b, i, axis] = p[i, axis], speed
+        for k in range(pucks):
+            velocity[b, paddles + k, 0] += kick
+            if out[b, k]:
+                velocity[b, paddles + k, 0] = velocity[b, paddles + k, 1] = 0.0
+
+    for b in range(len(law)):
+        if not busy[b]:
+            continue
+        kick = 0.5 * law[b, FALL]
+        begin(b, kick)
+        if path.shape[1] > 0:
+            record(b, 0, kick)
+        for step in range(n):
+            drive(b, n - step)
+            move(b)
+            meet_fixed(b)
+            cross(b, kick)
+            meet_each_other(b, (step + 1) * dt)
+            settle(b, kick)
+            if path.shape[1] > 0:
+                record(b, step + 1, kick)
+        finish(b, kick)
