@@ -280,7 +280,7 @@ def _substeps(
         for i in range(paddles, movers):
             if away[i] or not awake[i]:
                 continue
-            x, y, rest = p[i, 0], p[i, 1], law[b, WALL] * spring[i]
+            x, y, rest = p[i, 0], p[i, 1], min(law[b, WALL], spring[i])
             for c in range(len(lines) + len(obstacles)):
                 if c < len(lines):
                     depth, nx, ny = meet_side(x, y, radius[i], lines, c)
@@ -336,7 +336,7 @@ def _substeps(
                 before = nx * (was[j, 0] - was[i, 0]) + ny * (was[j, 1] - was[i, 1])
                 now = nx * (v[j, 0] - v[i, 0]) + ny * (v[j, 1] - v[i, 1])
                 taken = nx * (push[j, 0] - push[i, 0]) + ny * (push[j, 1] - push[i, 1])
-                gain = bounce(before, now, spring[i] * spring[j])
+                gain = bounce(before, now, min(spring[i], spring[j]))
                 back = take_back(depth, taken)
                 v[i, 0] -= gain * share * nx
                 v[i, 1] -= gain * share * ny

@@ -117,7 +117,7 @@ def limits(
     return Sent(sent, push, excess)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _filter(
     asked: Array,
     position: Array,
@@ -135,8 +135,20 @@ def _filter(
     excess: Array,
 ) -> bool:
     """`limits` for each seat of each world; False if an asked one is not finite."""
-    edges = normals.shape[1]
+    edges, rate = normals.shape[1], 1.0 / dt
     fastest = np.empty(edges)
+
+    # Functions in place: calls with arrays would cost more than the arithmetic.
+    def inside(s: int, x: float, y: float) -> tuple[float, float]:
+        """A velocity with what goes too fast toward an edge taken off."""
+        for _ in range(passes):
+            for k in range(edges):
+                nx, ny = normals[s, k, 0], normals[s, k, 1]
+                over = -(nx * x + ny * y) - fastest[k]
+                if over > 0.0:
+                    x, y = x + over * nx, y + over * ny
+        return x, y
+
     for b in range(asked.shape[0]):
         top, most = speed[b], acceleration[b] * dt
         for s in range(asked.shape[1]):
@@ -155,66 +167,47 @@ def _filter(
             # This step takes (v + h) dt / 2; the stop h^2 / 2a and, in ramped steps,
             # up to h dt / 2 more. It never needs more than the planned deceleration.
             planned = acceleration[b] * share[s]
+            ample = top * (0.5 * top / planned + dt)
+            px, py, close = position[b, s, 0], position[b, s, 1], False
             for k in range(edges):
                 nx, ny = normals[s, k, 0], normals[s, k, 1]
                 closing = -(nx * vx + ny * vy)
-                px, py = position[b, s, 0], position[b, s, 1]
                 room = nx * px + ny * py + offsets[s, k] - 0.5 * dt * closing
+                if room >= ample:
+                    fastest[k] = np.inf
+                    continue
+                close = True
                 h = planned * (np.sqrt(dt * dt + 2.0 * max(room, 0.0) / planned) - dt)
                 fastest[k] = max(h, closing - planned * dt)
-            sx, sy = _inside(wx, wy, normals[s], fastest, passes)
-            if (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
-                sx, sy = _within(sx, sy, vx, vy, most, normals[s], fastest, passes)
+            sx, sy = inside(s, wx, wy) if close else (wx, wy)
+            if close and (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
+                # Toward pure braking until the change is allowed. Both ends of the way
+                # lie inside the (convex) bounds of the edges, so all of it does.
+                bx, by = inside(s, vx, vy)
+                share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
+                sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
             sent[b, s, 0], sent[b, s, 1] = sx, sy
-            push[b, s, 0], push[b, s, 1] = (sx - vx) / dt, (sy - vy) / dt
+            push[b, s, 0], push[b, s, 1] = (sx - vx) * rate, (sy - vy) * rate
 
-            jx = dx / dt - pushed[b, s, 0]
-            jy = dy / dt - pushed[b, s, 1]
-            jolt = np.sqrt(jx * jx + jy * jy) / dt
-            over = excess[b, s]
-            over[0] = max(norm - top * (1 + 1e-6), 0.0)
-            over[1] = max(change / dt - acceleration[b] * (1 + 1e-6), 0.0)
-            over[2] = max(jolt - JERK * acceleration[b], 0.0)
-            over[3] = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2)
-            over[4] = (over[0] + over[3]) / top
-            over[4] += (over[1] + over[2] / JERK) / acceleration[b]
+            jx = dx * rate - pushed[b, s, 0]
+            jy = dy * rate - pushed[b, s, 1]
+            jolt = np.sqrt(jx * jx + jy * jy) * rate
+            fast = max(norm - top * (1 + 1e-6), 0.0)
+            hard = max(change * rate - acceleration[b] * (1 + 1e-6), 0.0)
+            jerky = max(jolt - JERK * acceleration[b], 0.0)
+            held = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2)
+            excess[b, s, 0], excess[b, s, 1] = fast, hard
+            excess[b, s, 2], excess[b, s, 3] = jerky, held
+            cost = (fast + held) / top + (hard + jerky / JERK) / acceleration[b]
+            excess[b, s, 4] = cost
     return True
 
 
-@njit(cache=True)
-def _inside(
-    x: float, y: float, normals: Array, fastest: Array, passes: int
-) -> tuple[float, float]:
-    """A velocity with what goes too fast toward an edge taken off."""
-    for _ in range(passes):
-        for k in range(len(fastest)):
-            nx, ny = normals[k, 0], normals[k, 1]
-            over = -(nx * x + ny * y) - fastest[k]
-            if over > 0.0:
-                x, y = x + over * nx, y + over * ny
-    return x, y
-
-
-@njit(cache=True)
-def _within(
-    sx: float,
-    sy: float,
-    vx: float,
-    vy: float,
-    most: float,
-    normals: Array,
-    fastest: Array,
-    passes: int,
-) -> tuple[float, float]:
-    """A sent velocity moved toward pure braking until its change is allowed.
-
-    Both ends of the way lie inside the (convex) bounds of the edges, so all of it does.
-    """
-    bx, by = _inside(vx, vy, normals, fastest, passes)
-    wx, wy = sx - bx, sy - by
+@njit(cache=True, error_model="numpy")
+def _within(wx: float, wy: float, dx: float, dy: float, most: float) -> float:
+    """The largest share of (wx, wy) with |(dx, dy) + share (wx, wy)| <= most, 0..1."""
     a = max(wx * wx + wy * wy, 1e-18)
-    b = (bx - vx) * wx + (by - vy) * wy
-    c = (bx - vx) ** 2 + (by - vy) ** 2 - most * most
+    b = dx * wx + dy * wy
+    c = dx * dx + dy * dy - most * most
     share = (np.sqrt(max(b * b - a * c, 0.0)) - b) / a
-    share = min(max(share, 0.0), 1.0)
-    return bx + share * wx, by + share * wy
+    return float(min(max(share, 0.0), 1.0))

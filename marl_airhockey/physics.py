@@ -44,8 +44,8 @@ PARAMETERS: dict[str, Parameter] = {
     "position_noise": Parameter(0.0, 0.0, 0.05, "m", "standard deviation, per axis"),
     "occlusion": Parameter(0.0, 0.0, 0.5, "1", "share of time a puck is unseen"),
 }
-"""Every physical parameter. A pair's restitution is the product of its bodies', a
-puck's being 1: two blocks meet with the square of ``block_restitution``."""
+"""Every physical parameter. A pair's restitution is the lower of its bodies', a puck's
+being 1."""
 
 ROBOT_SENSING: dict[str, float] = {
     "action_delay": 0.050,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.draws import Draws
@@ -71,13 +72,29 @@ def _shoot(draws: Draws, puck: Array, cast: Cast) -> tuple[Array, Array]:
     closing = (met[:, 2:] * normal).sum(-1) - push
     bounce = (1 + physics["paddle_restitution"]) * closing
     path = roll(met[:, :2], met[:, 2:] - bounce[:, None] * normal, SECONDS, *ways)
-    x, y, vx, vy = np.moveaxis(path, -1, 0)
-    rising = np.logical_and.accumulate(
-        (vx > 0.2) & (x < table.size[0] / 2 - table.puck_radius), axis=-1
-    )
-    good = rising & (x > 0.05) & (x < 0.738) & (np.abs(y) < 0.205)
-    good &= (vx >= 0.5) & (np.abs(vy) < np.tan(np.radians(30.0)) * vx)
-    count = good.sum(-1)
-    wanted = np.floor(choice * count) + 1
-    moment = (np.cumsum(good, axis=-1) >= wanted[:, None]).argmax(-1)
-    return path[rows, moment], legal & (closing < 0) & (count > 0)
+    moment = np.empty(len(rows), np.int64)
+    _choose(path, table.size[0] / 2 - table.puck_radius, choice, moment)
+    return path[rows, moment], legal & (closing < 0) & (moment >= 0)
+
+
+@njit(cache=True)
+def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
+    """A random good moment of each path (W, T, 4) while it rises; -1 if none is."""
+    steep = np.tan(np.radians(30.0))
+    for w in range(len(path)):
+        good, moment[w] = 0, -1
+        # Twice: the first time to count the good moments, the second to take one.
+        for turn in range(2):
+            wanted, count = int(choice[w] * good) if turn else -1, 0
+            for t in range(path.shape[1]):
+                x, y = path[w, t, 0], path[w, t, 1]
+                vx, vy = path[w, t, 2], path[w, t, 3]
+                if vx <= 0.2 or x >= end:
+                    break
+                if not (0.05 < x < 0.738 and abs(y) < 0.205):
+                    continue
+                if vx >= 0.5 and abs(vy) < steep * vx:
+                    if count == wanted:
+                        moment[w] = t
+                    count += 1
+            good = count

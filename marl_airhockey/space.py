@@ -59,6 +59,8 @@ class Space:
         self._build_walls()
         space.on_collision(PADDLE, PUCK, begin=self._touch, separate=self._part)
         space.on_collision(PUCK, MOUTH, begin=self._cross)
+        for kind in (PADDLE, WALL, MOUTH, BLOCK):
+            space.on_collision(BLOCK, kind, pre_solve=self._soften)
         self._read = Reader(space, len(self.bodies))
         self._space = space._space
         self._raw = [body._body for body in self.bodies]
@@ -165,6 +167,11 @@ class Space:
     def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         paddle, puck = arbiter.shapes
         self.touching[self._shapes[paddle], self._shapes[puck]] = False
+
+    def _soften(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Chipmunk takes the product of two restitutions, which is right for pucks."""
+        a, b = arbiter.shapes
+        arbiter.restitution = min(a.elasticity, b.elasticity)
 
     def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         puck, mouth = arbiter.shapes

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
+from numba import njit
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.draws import Draws
@@ -88,7 +89,7 @@ def roll(
     Args:
         position: (W, 2) m.
         velocity: (W, 2) m/s.
-        times: (T,) s.
+        times: (T,) s, ascending.
         pull: acceleration toward home, m/s2.
         damping: drag c, 1/s, above 0.
         half_width: largest |y| of the puck's centre, m.
@@ -97,25 +98,40 @@ def roll(
     Returns:
         (W, T, 4) x, y, vx, vy.
     """
+    out = np.empty((len(position), len(times), 4))
     fade = np.exp(-damping * times)
-    u = (1 - fade) / damping
-    fall = pull / damping
-    vx = (velocity[:, :1] + fall) * fade - fall
-    x = position[:, :1] + (velocity[:, :1] + fall) * u - fall * times
-    side = np.where(velocity[:, 1:] < 0, -1.0, 1.0)
-    speed = np.maximum(np.abs(velocity[:, 1:]), 1e-9)
-    y, vy = position[:, 1:] + velocity[:, 1:] * u, velocity[:, 1:] * fade
-    bank = (half_width - side * position[:, 1:]) / speed
-    for _ in range(8):
-        past = u >= bank
-        if not past.any():
-            break
-        speed = speed * restitution
-        y = np.where(past, side * (half_width - speed * (u - bank)), y)
-        vy = np.where(past, -side * speed * fade, vy)
-        bank = bank + 2 * half_width / speed
-        side = -side
-    return np.stack([x, y, vx, vy], -1)
+    start = np.concatenate([position, velocity], -1)
+    _roll(start, times, fade, pull / damping, damping, half_width, restitution, out)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _roll(
+    start: Array,
+    times: Array,
+    fade: Array,
+    fall: float,
+    damping: float,
+    half_width: float,
+    restitution: float,
+    out: Array,
+) -> None:
+    """Fill ``out`` (W, T, 4) for ``start`` (W, 4); ``fall`` is the terminal speed."""
+    for w in range(len(start)):
+        x, y, vx, vy = start[w, 0], start[w, 1], start[w, 2], start[w, 3]
+        side = -1.0 if vy < 0.0 else 1.0
+        speed, last, edge = max(abs(vy), 1e-9), 0.0, y
+        bank = (half_width - side * y) / speed
+        for t in range(len(times)):
+            u = (1.0 - fade[t]) / damping
+            while u >= bank and speed > 1e-9:
+                edge, last = side * half_width, bank
+                speed, side = speed * restitution, -side
+                bank += 2.0 * half_width / max(speed, 1e-9)
+            out[w, t, 0] = x + (vx + fall) * u - fall * times[t]
+            out[w, t, 1] = edge + side * speed * (u - last)
+            out[w, t, 2] = (vx + fall) * fade[t] - fall
+            out[w, t, 3] = side * speed * fade[t]
 
 
 def inside(draws: Draws, cast: Cast, seat: int, margin: float = 0.0) -> Array:

@@ -1,11 +1,14 @@
-"""Train every task with its preset over several seeds and print the table.
+"""Train every task with its preset over several seeds, print the table, draw curves.
 
     python scripts/reproduce_tasks.py --seeds 5 --jobs 2 --out runs/tasks
     python scripts/reproduce_tasks.py --profile robot --seeds 1 --out runs/robot
 
 A run that is there already is not trained again, so the script can be stopped and
 started. Success is that of the last policy (no checkpoint is picked) over the test
-seeds, which training never sees.
+seeds, which training never sees: on the batched backend that it was trained on, on
+pymunk, and with one control step of action delay that it was not trained with. The
+paper's column is the row of Table I for RL in its 2D simulator (arXiv 2405.03113),
+under the paper's own rules and physics.
 """
 
 from __future__ import annotations
@@ -23,16 +26,26 @@ from rich.table import Table
 
 from marl_airhockey import make_agent
 from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.plots import seed_curves
 from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train
 from marl_airhockey.make import Keywords
-from marl_airhockey.match import evaluate
+from marl_airhockey.match import evaluate, interval
 
-TASKS = (
-    "reach,reach_velocity,touch,strike,strike_crowd,juggle,puck_velocity,"
-    "move_block,hit_goal,hit_goal_velocity"
-)
-EPISODES = 1000
+PAPER = {
+    "reach": 1.0,
+    "reach_velocity": 1.0,
+    "touch": 1.0,
+    "strike": 1.0,
+    "strike_crowd": 1.0,
+    "juggle": 1.0,
+    "puck_velocity": 1.0,
+    "move_block": 0.0,
+    "hit_goal": 0.9,
+    "hit_goal_velocity": 0.0,
+}
+EPISODES = 2000
+BARS = (0.5, 0.9, 0.95)
 
 
 def run(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
@@ -42,31 +55,45 @@ def run(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
         return dict(json.loads(result.read_text()))
     config = preset(scenario, {"seed": seed, "profile": profile})
     train(None if (folder / "config.toml").exists() else config, folder)
-    keywords: Keywords = {"profile": profile}
+    here: Keywords = {"profile": profile, "backend": "batched"}
+    there: Keywords = {"profile": profile, "backend": "pymunk"}
+    late: Keywords = {**here, "physics": {"action_delay": 0.05}}
+    cases = {
+        "success": (True, here),
+        "sampled": (False, here),
+        "pymunk": (True, there),
+        "delayed": (True, late),
+    }
+    if scenario == "juggle":
+        for hits in (10, 20):
+            cases[f"{hits} hits"] = (True, {**here, "options": {"hits": hits}})
     row: dict[str, Any] = {"scenario": scenario, "profile": profile, "seed": seed}
-    for name, mean in (("deterministic", True), ("sampled", False)):
+    for name, (mean, keywords) in cases.items():
         policy = load_policy(folder / "last.zip", deterministic=mean)
         found = evaluate(policy, name, scenario, EPISODES, keywords=keywords)
         row[name] = found.success
-        if mean:
-            row["first_shot"], row["grade"] = (
-                found.first_shot,
-                found.deployability.grade,
-            )
-    with (folder / "evaluations.csv").open() as file:
-        curve = list(csv.DictReader(file))
+        if name == "success":
+            row["first_shot"] = found.first_shot
+            row["grade"] = found.deployability.grade
+    curve = evaluations(folder)
     row["cpu_minutes"] = float(curve[-1]["cpu_seconds"]) / 60
     row["steps"] = int(curve[-1]["steps"])
-    for bar in (0.5, 0.9, 0.95):
+    for bar in BARS:
         times = [float(c["cpu_seconds"]) for c in curve if float(c["success"]) >= bar]
         row[f"cpu_seconds_to_{bar}"] = times[0] if times else None
     result.write_text(json.dumps(row, indent=1))
     return row
 
 
+def evaluations(folder: Path) -> list[dict[str, str]]:
+    """The rows of a run's evaluations."""
+    with (folder / "evaluations.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
 def floors(scenario: str, profile: str) -> dict[str, float]:
     """Success of the drivers that know nothing."""
-    keywords: Keywords = {"profile": profile}
+    keywords: Keywords = {"profile": profile, "backend": "batched"}
     return {
         name: evaluate(make_agent(name), name, scenario, EPISODES, 0, keywords).success
         for name in ("still", "random", "sticky")
@@ -74,7 +101,9 @@ def floors(scenario: str, profile: str) -> dict[str, float]:
 
 
 def main(
-    tasks: Annotated[str, typer.Option(help="Comma-separated scenarios.")] = TASKS,
+    tasks: Annotated[str, typer.Option(help="Comma-separated scenarios.")] = ",".join(
+        PAPER
+    ),
     seeds: Annotated[int, typer.Option(help="Seeds 0 .. n - 1.")] = 5,
     profile: Annotated[str, typer.Option(help="ideal or robot.")] = "ideal",
     jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
@@ -95,19 +124,28 @@ def main(
             rows.append(future.result())
             console.print_json(json.dumps(rows[-1]))
     heads = (
-        *("task", "success", "worst seed", "sampled", "first shot", "CPU-min"),
-        *("M steps", "CPU-s to 0.9", "still", "random", "sticky"),
+        *("task", "success", "worst seed", "95 % interval", "sampled", "first shot"),
+        *("on pymunk", "delayed", "CPU-min", "M steps", "CPU-s to .5 / .9 / .95"),
+        *("still", "random", "sticky", "paper's RL"),
     )
-    lines = [
-        line(name, [row for row in rows if row["scenario"] == name], profile)
-        for name in names
-    ]
+    by_task = {name: [row for row in rows if row["scenario"] == name] for name in names}
+    lines = [line(name, found, profile) for name, found in by_task.items()]
     table = Table(
         *heads, title=f"{profile} profile, {seeds} seeds, {EPISODES} episodes"
     )
     for cells in lines:
         table.add_row(*cells)
     console.print(table)
+    for row in by_task.get("juggle", []):
+        more = {k: v for k, v in row.items() if str(k).endswith(" hits")}
+        console.print("juggle, seed", row["seed"], more)
+    curves = {
+        name: [evaluations(out / f"{name}-{profile}-{seed}") for seed in range(seeds)]
+        for name in names
+    }
+    picture = out / f"curves_{profile}.png"
+    seed_curves(curves, picture)
+    console.print("learning curves:", picture)
     if markdown is not None:
         ruled = [heads, ("---",) * len(heads), *lines]
         text = "".join(f"| {' | '.join(cells)} |\n" for cells in ruled)
@@ -120,18 +158,26 @@ def line(name: str, rows: list[dict[str, Any]], profile: str) -> tuple[str, ...]
     def mean(key: str) -> float:
         return float(np.mean([row[key] for row in rows]))
 
-    late = [row["cpu_seconds_to_0.9"] for row in rows]
+    def reached(bar: float) -> str:
+        times = [row[f"cpu_seconds_to_{bar}"] for row in rows]
+        return "-" if None in times else f"{np.mean(times):.0f}"
+
+    low, high = interval(mean("success"), EPISODES * len(rows))
     ground = floors(name, profile)
     return (
         name,
-        f"{mean('deterministic'):.3f}",
-        f"{min(row['deterministic'] for row in rows):.3f}",
+        f"{mean('success'):.3f}",
+        f"{min(row['success'] for row in rows):.3f}",
+        f"{low:.3f}..{high:.3f}",
         f"{mean('sampled'):.3f}",
         f"{mean('first_shot'):.3f}",
+        f"{mean('pymunk'):.3f}",
+        f"{mean('delayed'):.3f}",
         f"{mean('cpu_minutes'):.1f}",
         f"{mean('steps') / 1e6:.1f}",
-        "-" if None in late else f"{np.mean(late):.0f}",
+        " / ".join(reached(bar) for bar in BARS),
         *(f"{ground[k]:.3f}" for k in ("still", "random", "sticky")),
+        f"{PAPER[name]:.1f}" if name in PAPER else "-",
     )
 
 

@@ -337,3 +337,19 @@ def test_pucks_stay_on_a_regular_polygon(backend, sides):
         state = world.step(Command(np.zeros((1, sides, 2))))
         depth = state.puck[0] @ table.normals.T + table.offsets
         assert (depth > 0).all()
+
+
+def test_two_blocks_meet_with_the_restitution_of_blocks(backend):
+    bench = Bench(backend, {"block_friction": 0.0}, blocks=2)
+    bench.start(
+        (-0.7, 0.0), (0.0, 0.25, 0.0, 0.0), (-0.1, 0.0, 1.0, 0.0), (0.1, 0.0, 0.0, 0.0)
+    )
+    last = bench.run(0.3)[-1]
+    np.testing.assert_allclose(
+        last.block_velocity[0, :, 0], [0.5 * 0.1, 0.5 * 1.9], rtol=1e-6
+    )
+    bench.start(
+        (-0.7, 0.0), (0.0, 0.25, 0.0, 0.0), (0.6, 0.0, 1.0, 0.0), (0.1, 0.0, 0.0, 0.0)
+    )
+    last = bench.run(0.4)[-1]
+    np.testing.assert_allclose(last.block_velocity[0, 0, 0], -0.9, rtol=1e-6)

@@ -23,7 +23,7 @@ class TrainConfig:
 
     scenario: str
     seed: int = 0
-    backend: str = "pymunk"
+    backend: str = "batched"
     profile: str = "ideal"
     observe: str = "velocity"
     options: dict[str, Any] = field(default_factory=dict)

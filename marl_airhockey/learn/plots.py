@@ -9,6 +9,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
 
 INK, SAMPLED = "#0072B2", "#86b8d8"
 FLOOR_INKS = ("#8a8f98", "#b06a00", "#00805c")
@@ -48,5 +49,47 @@ def learning_curve(
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(alpha=0.25)
     axes.legend(frameon=False, loc="center right")
+    figure.savefig(path)
+    plt.close(figure)
+
+
+def seed_curves(
+    runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]], path: Path
+) -> None:
+    """Success against CPU-seconds: mean and range over seeds, a panel for each task.
+
+    Args:
+        runs: for each task, the rows of ``evaluations.csv`` of each seed.
+        path: of the PNG.
+    """
+    across = min(5, len(runs))
+    down = -(-len(runs) // across)
+    figure, grid = plt.subplots(
+        down,
+        across,
+        figsize=(2.6 * across, 2.2 * down),
+        dpi=130,
+        layout="constrained",
+        squeeze=False,
+        sharey=True,
+    )
+    for axes in grid.flat[len(runs) :]:
+        axes.set_visible(False)
+    for axes, (name, seeds) in zip(grid.flat, runs.items(), strict=False):
+        length = min(len(rows) for rows in seeds)
+        share = np.array(
+            [[float(row["success"]) for row in rows[:length]] for rows in seeds]
+        )
+        cpu = np.mean(
+            [[float(row["cpu_seconds"]) for row in rows[:length]] for rows in seeds], 0
+        )
+        axes.fill_between(cpu, share.min(0), share.max(0), color=SAMPLED, alpha=0.6)
+        axes.plot(cpu, share.mean(0), color=INK)
+        axes.axhline(0.95, color=FLOOR_INKS[0], linestyle=":", linewidth=1)
+        axes.set(title=name.replace("_", " "), ylim=(-0.03, 1.03), xlim=(0, None))
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(alpha=0.25)
+    figure.supxlabel("CPU-seconds of training")
+    figure.supylabel("success")
     figure.savefig(path)
     plt.close(figure)
