@@ -90,6 +90,8 @@ class Motion(NamedTuple):
     """(B, N, 2) m/s"""
     path: Array
     """(B, substeps + 1, movers, 4) x, y, vx, vy, or (B, 0, movers, 4) if not wanted"""
+    push: Array
+    """(B, movers, 2) m: what the next substep takes back of overlaps"""
 
 
 class Events(NamedTuple):
@@ -133,12 +135,8 @@ def _find_busy(
     A body stays within a disc about its place, of the way that it can go at most.
     """
     paddles, pucks, blocks, radius, lines, _, obstacles, control_dt, n = ground
-    position, velocity, goal, out = (
-        motion.position,
-        motion.velocity,
-        order.goal,
-        events.out,
-    )
+    position, velocity, _, push = motion
+    goal, out = order.goal, events.out
     first, movers = paddles + pucks, paddles + pucks + blocks
     way = np.zeros(movers)
     for b in range(len(law)):
@@ -154,6 +152,7 @@ def _find_busy(
                 extra = -np.inf if out[b, i - paddles] else fall
             else:
                 met |= most > 0.0 or law[b, FALL] > law[b, GRIP]
+                met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
             way[i] = radius[i] + (np.sqrt(most) + extra) * control_dt
         for i in range(paddles, first):
             x, y = position[b, i, 0], position[b, i, 1]
@@ -226,7 +225,7 @@ def _substeps(
     """
     paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, n = ground
     goal, told, lifted = order
-    position, velocity, path = motion
+    position, velocity, path, pending = motion
     touched, touched_at, touching, crossed, crossed_velocity, leaning, out = events
     first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
     # Of one world: places, velocities, those before this substep's forces, ways that
@@ -241,7 +240,7 @@ def _substeps(
         for i in range(movers):
             for axis in range(2):
                 p[i, axis], v[i, axis] = position[b, i, axis], velocity[b, i, axis]
-                push[i, axis] = 0.0
+                push[i, axis] = pending[b, i, axis]
             if i < paddles:
                 spring[i], away[i] = law[b, PADDLE], lifted[b, i]
                 for axis in range(2):
@@ -347,13 +346,14 @@ def _substeps(
                 push[j, 0] += back * other * nx
                 push[j, 1] += back * other * ny
 
+    def hold_blocks(b: int) -> None:
+        for i in range(first, movers):
+            speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
+            share = rub(speed, law[b, GRIP])
+            v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
+
     def settle(b: int, kick: float) -> None:
-        for i in range(paddles, movers):
-            if i >= first:
-                speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-                share = rub(speed, law[b, GRIP])
-                v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
-                continue
+        for i in range(paddles, first):
             vx, vy = v[i, 0] + kick, v[i, 1]
             share = cap(np.sqrt(vx * vx + vy * vy), PUCK_SPEED_CAP)
             if share < 1.0:
@@ -382,6 +382,7 @@ def _substeps(
             for axis in range(2):
                 speed = ramped[i, axis] if i < paddles else v[i, axis]
                 position[b, i, axis], velocity[b, i, axis] = p[i, axis], speed
+                pending[b, i, axis] = push[i, axis]
         for k in range(pucks):
             velocity[b, paddles + k, 0] += kick
             if out[b, k]:
@@ -400,6 +401,10 @@ def _substeps(
             meet_fixed(b)
             cross(b, kick)
             meet_each_other(b, (step + 1) * dt)
+            if blocks > 0:
+                # Friction acts within a contact, which has to give back its share.
+                hold_blocks(b)
+                meet_each_other(b, (step + 1) * dt)
             settle(b, kick)
             if path.shape[1] > 0:
                 record(b, step + 1, kick)

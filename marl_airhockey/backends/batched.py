@@ -43,6 +43,7 @@ class Batched(Backend):
         self._quiet = self.state = still_state(bodies, num_worlds, len(mouths))
         self._leaning = np.zeros((num_worlds, bodies.pucks, len(mouths)), np.bool_)
         self._out = np.zeros((num_worlds, bodies.pucks), np.bool_)
+        self._push = np.zeros((num_worlds, bodies.movers, 2))
         self._never = np.zeros((num_worlds, bodies.paddles), np.bool_)
         moments = substeps + 1 if cast.path else 0
         self._moments = (num_worlds, moments, bodies.movers, 4)
@@ -66,6 +67,7 @@ class Batched(Backend):
         self.state = state if everywhere else self.state.scatter(worlds, state)
         self._leaning[worlds] = False
         self._out[worlds] = False
+        self._push[worlds] = 0.0
 
     def step(self, command: Command) -> State:
         old, quiet = self.state, self._quiet
@@ -88,7 +90,7 @@ class Batched(Backend):
             self._out,
         )
         order = Order(goal, told, lifted)
-        motion = Motion(position, velocity, path)
+        motion = Motion(position, velocity, path, self._push)
         advance(self._ground, self._laws, order, motion, events)
         if command.told is not None:
             velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]

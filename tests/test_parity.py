@@ -1,0 +1,174 @@
+"""The batched backend does what pymunk does, from the same start."""
+
+import numpy as np
+import pytest
+
+from marl_airhockey.backend import Command
+from marl_airhockey.cast import Cast, Mouth, Obstacle
+from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.registry import find_backend
+from marl_airhockey.starts import first_state
+from marl_airhockey.table import TABLES, Table, make_seat
+
+TABLE = TABLES["standard"]
+DT = 0.05
+RNG = np.random.default_rng(0)
+PADDLE, PUCK = TABLE.paddle_radius, TABLE.puck_radius
+
+
+def play(cast, rows, seconds, command=None, **physics):
+    """States of both backends, {name: (T, ...) states}, from ``rows`` (B, N, 4)."""
+    values = {name: p.default for name, p in PARAMETERS.items()}
+    values.update({"tilt": 0.0, "puck_damping": 0.0} | physics)
+    worlds = len(rows)
+    found = {}
+    for name in ("pymunk", "batched"):
+        backend = find_backend(name)(cast, worlds, DT, 10)
+        arrays = {k: np.full(worlds, v) for k, v in values.items()}
+        backend.set_physics(arrays, np.ones(worlds, bool))
+        state = first_state(cast, worlds)
+        movers = cast.bodies.movers
+        state.position[:, :movers] = rows[..., :2]
+        state.velocity[:, :movers] = rows[..., 2:]
+        backend.start(state, np.ones(worlds, bool))
+        sent = np.zeros((worlds, cast.bodies.paddles, 2))
+        sent = sent if command is None else command
+        found[name] = [backend.step(Command(sent)) for _ in range(round(seconds / DT))]
+    return found["pymunk"], found["batched"]
+
+
+def bodies(worlds, *others):
+    """(B, 1 + n, 4) rows: a paddle out of the way, and others, (4,) or (B, 4) each."""
+    rows = np.zeros((worlds, 1 + len(others), 4))
+    rows[:, 0, :2] = (-0.75, 0.25)
+    for i, other in enumerate(others, start=1):
+        rows[:, i] = other
+    return rows
+
+
+def cast(**options):
+    return Cast(TABLE, (make_seat("robot", TABLE, 0),), **{"pucks": 1} | options)
+
+
+def same_outcome(pymunk, batched, share=0.02, least=0.05):
+    """Velocities at the end within a share of the speeds; blocks' places too."""
+    a, b = pymunk[-1], batched[-1]
+    speed = np.linalg.norm(a.velocity, axis=-1).max(-1)
+    error = np.linalg.norm(a.velocity - b.velocity, axis=-1).max(-1)
+    assert (error <= share * np.maximum(speed, least)).all(), error.max()
+    touches = [
+        np.sum([s.touched for s in states], axis=0) for states in (pymunk, batched)
+    ]
+    np.testing.assert_array_equal(*touches)
+
+
+def polar(speed, angle):
+    return np.stack([speed * np.cos(angle), speed * np.sin(angle)], -1)
+
+
+@pytest.mark.parametrize(("tilt", "damping"), [(0.0, 0.0), (5.5, 0.15), (9.0, 0.8)])
+def test_free_flight_and_banks_agree_to_a_millimetre_over_two_seconds(tilt, damping):
+    worlds = 200
+    rows = bodies(
+        worlds,
+        np.concatenate(
+            [
+                RNG.uniform((-0.2, -0.25), (0.7, 0.25), (worlds, 2)),
+                RNG.uniform(-1.5, 1.5, (worlds, 2)),
+            ],
+            -1,
+        ),
+    )
+    rows[:, 0, :2] = (-0.78, 0.25)
+    pair = play(cast(), rows, 2.0, tilt=tilt, puck_damping=damping)
+    alone = ~np.any([s.touched.any((1, 2)) for s in pair[0]], axis=0)
+    assert alone.mean() > 0.7
+    for a, b in zip(*pair, strict=True):
+        gap = np.linalg.norm(a.puck - b.puck, axis=-1)[alone]
+        assert gap.max() < 1e-3
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_puck_and_a_paddle_at_all_angles_and_speeds(moving):
+    worlds = 500
+    angle, off = RNG.uniform(0, 2 * np.pi, worlds), RNG.uniform(-0.99, 0.99, worlds)
+    speed = RNG.uniform(0.3, 4.5, worlds)
+    away, aside = polar(1.0, angle), polar(1.0, angle + np.pi / 2)
+    start = (off * (PADDLE + PUCK))[:, None] * aside - 0.1 * away
+    rows = bodies(worlds, np.concatenate([start, polar(speed, angle)], -1))
+    rows[:, 0, :2] = 0.0
+    sent = np.zeros((worlds, 1, 2))
+    if moving:
+        pace = RNG.uniform(0, 0.35, worlds)
+        sent[:, 0] = polar(pace, RNG.uniform(0, 2 * np.pi, worlds))
+    pymunk, batched = play(cast(), rows, 0.35, sent)
+    assert np.mean(np.any([s.touched.any((1, 2)) for s in pymunk], axis=0)) > 0.8
+    same_outcome(pymunk, batched)
+
+
+def test_a_puck_strikes_a_block_head_on_and_glancing():
+    worlds, reach = 300, PUCK + 0.0377
+    off = RNG.uniform(-0.99, 0.99, worlds)
+    puck = np.zeros((worlds, 4))
+    puck[:, 1], puck[:, 2] = off * reach, RNG.uniform(0.3, 4.0, worlds)
+    puck[:, 0] = -np.sqrt(reach**2 - puck[:, 1] ** 2) - 0.003
+    rows = bodies(worlds, puck, (0.0, 0.0, 0.0, 0.0))
+    pymunk, batched = play(cast(blocks=1), rows, 0.05)
+    assert (np.linalg.norm(pymunk[-1].block_velocity, axis=-1) > 0).mean() > 0.9
+    same_outcome(pymunk, batched)
+
+
+def test_two_pucks_meet():
+    worlds = 300
+    off = RNG.uniform(-0.99, 0.99, worlds)
+    first, second = np.zeros((2, worlds, 4))
+    first[:, 1], first[:, 2] = off * 2 * PUCK, RNG.uniform(0.3, 3.0, worlds)
+    second[:, 0], second[:, 2] = 0.15, RNG.uniform(-2.0, 0.2, worlds)
+    rows = bodies(worlds, first, second)
+    same_outcome(*play(cast(pucks=2), rows, 0.2))
+
+
+def test_a_puck_in_a_corner():
+    worlds = 200
+    angle, speed = RNG.uniform(0.05, 1.52, worlds), RNG.uniform(0.3, 4.0, worlds)
+    start = np.array([0.75, 0.22]) + RNG.uniform(-0.03, 0.03, (worlds, 2))
+    rows = bodies(worlds, np.concatenate([start, polar(speed, angle)], -1))
+    same_outcome(*play(cast(), rows, 0.3))
+
+
+def test_a_puck_at_a_goal_post_and_through_the_mouth():
+    worlds = 400
+    goal = cast(mouths=(Mouth("far", 2, 0.30), Mouth("home", 0)))
+    puck = np.zeros((worlds, 4))
+    puck[:, 0], puck[:, 1] = 0.65, RNG.uniform(0.10, 0.20, worlds)
+    puck[:, 2], puck[:, 3] = RNG.uniform(0.8, 3.0, worlds), RNG.uniform(-1, 1, worlds)
+    pymunk, batched = play(goal, bodies(worlds, puck), 0.3)
+    crossed = [
+        np.any([s.crossed[:, 0, 0] for s in states], axis=0)
+        for states in (pymunk, batched)
+    ]
+    np.testing.assert_array_equal(*crossed)
+    assert 0.2 < crossed[0].mean() < 0.9
+    same_outcome(pymunk, batched)
+
+
+def test_a_puck_at_obstacles():
+    worlds = 300
+    posts = (Obstacle((0.2, 0.05), 0.05), Obstacle((0.1, -0.2), 0.01, (0.3, -0.1)))
+    puck = np.zeros((worlds, 4))
+    puck[:, 1], puck[:, 2] = RNG.uniform(-0.25, 0.25, worlds), 1.5
+    same_outcome(*play(cast(obstacles=posts), bodies(worlds, puck), 0.25))
+
+
+def test_a_puck_on_a_pentagon_away_from_its_corners():
+    worlds, table = 300, Table.regular(5, 0.45)
+    pentagon = Cast(table, (make_seat("arcade", table, 0, (1,)),), pucks=1)
+    puck = np.zeros((worlds, 4))
+    side = RNG.integers(1, 5, worlds)
+    out = -table.normals[side]
+    puck[:, 2:] = 1.2 * out + RNG.uniform(-0.4, 0.4, worlds)[:, None] * np.stack(
+        [-out[:, 1], out[:, 0]], -1
+    )
+    rows = bodies(worlds, puck)
+    rows[:, 0, :2] = (-0.35, 0.0)
+    same_outcome(*play(pentagon, rows, 0.45))
