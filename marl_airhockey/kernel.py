@@ -235,6 +235,10 @@ def _substeps(
     ramped = np.zeros((paddles, 2))
     weight, spring = np.zeros(movers), np.ones(movers)
     away, awake = np.zeros(movers, np.bool_), np.zeros(movers, np.bool_)
+    # Which sides and obstacles anything can reach as long as nothing is faster than
+    # `bound`: the first `listed` of `fixed`.
+    fixed = np.zeros(len(lines) + len(obstacles), np.int64)
+    listed, bound = np.zeros(1, np.int64), np.zeros(1)
 
     def begin(b: int, kick: float) -> None:
         for i in range(movers):
@@ -252,6 +256,36 @@ def _substeps(
                 v[i, 0] -= kick
             else:
                 weight[i], spring[i] = 1.0 / law[b, BLOCK_MASS], law[b, BLOCK]
+
+    def list_fixed(b: int) -> None:
+        bound[0] = 2.0 * n * law[b, FALL]
+        for i in range(movers):
+            most = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]
+            if i < paddles:
+                gx, gy = goal[b, i, 0], goal[b, i, 1]
+                most = max(most, gx * gx + gy * gy)
+            bound[0] += 2.0 * np.sqrt(most)
+        listed[0] = 0
+        for c in range(len(fixed)):
+            reached = False
+            for i in range(paddles, movers):
+                x, y, way = p[i, 0], p[i, 1], radius[i] + bound[0] * control_dt
+                if c < len(lines):
+                    ahead = lines[c, 0] * x + lines[c, 1] * y + lines[c, 2]
+                    reached |= ahead < way
+                else:
+                    o = c - len(lines)
+                    reached |= meet_obstacle(x, y, way, obstacles, o)[0] > 0.0
+            if reached:
+                fixed[listed[0]] = c
+                listed[0] += 1
+
+    def list_all_if_fast() -> None:
+        for i in range(paddles, movers):
+            if v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] > bound[0] * bound[0]:
+                bound[0], listed[0] = np.inf, len(fixed)
+                for c in range(len(fixed)):
+                    fixed[c] = c
 
     def drive(b: int, left: int) -> None:
         for i in range(paddles):
@@ -280,7 +314,8 @@ def _substeps(
             if away[i] or not awake[i]:
                 continue
             x, y, rest = p[i, 0], p[i, 1], min(law[b, WALL], spring[i])
-            for c in range(len(lines) + len(obstacles)):
+            for place in range(listed[0]):
+                c = fixed[place]
                 if c < len(lines):
                     depth, nx, ny = meet_side(x, y, radius[i], lines, c)
                 else:
@@ -304,7 +339,8 @@ def _substeps(
                 if away[i]:
                     continue
                 if whole:
-                    leans = meet_side(x, y, radius[i], lines, s)[0] > 0.0
+                    ahead = lines[s, 0] * x + lines[s, 1] * y + lines[s, 2]
+                    leans = ahead < radius[i]
                     began = leans and not leaning[b, k, m]
                     leaning[b, k, m] = leans
                 else:
@@ -358,16 +394,15 @@ def _substeps(
             share = cap(np.sqrt(vx * vx + vy * vy), PUCK_SPEED_CAP)
             if share < 1.0:
                 v[i, 0], v[i, 1] = share * vx - kick, share * vy
-            if wall(lines, radius[i], p[i, 0], p[i, 1], SQUEEZE) >= 0:
-                held = False
-                for j in range(paddles):
-                    held |= touching[b, j, i - paddles]
-                    held |= touched[b, j, i - paddles] > 0
-                if held:
-                    touch = radius[0] + radius[i]
-                    x, y = slip(lines, radius[i], p[i, 0], p[i, 1], p[:paddles], touch)
-                    p[i, 0], p[i, 1] = x, y
-                    push[i, 0] = push[i, 1] = 0.0
+            held = False
+            for j in range(paddles):
+                k = i - paddles
+                held |= touching[b, j, k] or touched[b, j, k] > 0
+            if held and wall(lines, radius[i], p[i, 0], p[i, 1], SQUEEZE) >= 0:
+                touch = radius[0] + radius[i]
+                x, y = slip(lines, radius[i], p[i, 0], p[i, 1], p[:paddles], touch)
+                p[i, 0], p[i, 1] = x, y
+                push[i, 0] = push[i, 1] = 0.0
 
     def record(b: int, moment: int, kick: float) -> None:
         for i in range(path.shape[2]):
@@ -393,6 +428,7 @@ def _substeps(
             continue
         kick = 0.5 * law[b, FALL]
         begin(b, kick)
+        list_fixed(b)
         if path.shape[1] > 0:
             record(b, 0, kick)
         for step in range(n):
@@ -406,6 +442,7 @@ def _substeps(
                 hold_blocks(b)
                 meet_each_other(b, (step + 1) * dt)
             settle(b, kick)
+            list_all_if_fast()
             if path.shape[1] > 0:
                 record(b, step + 1, kick)
         finish(b, kick)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,6 +12,9 @@ from marl_airhockey.kernel import LAWS, Events, Ground, Motion, Order, advance, 
 from marl_airhockey.rails import sides
 from marl_airhockey.state import Array, State, still_state
 from marl_airhockey.table import GRAVITY
+
+KEPT = ("position", "velocity", "touching", "time")
+"""The arrays of a state that the next step needs."""
 
 
 class Batched(Backend):
@@ -40,7 +42,8 @@ class Batched(Backend):
             substeps,
         )
         self._laws = np.zeros((num_worlds, LAWS))
-        self._quiet = self.state = still_state(bodies, num_worlds, len(mouths))
+        self._quiet = still_state(bodies, num_worlds, len(mouths))
+        self._rows = {name: getattr(self._quiet, name) for name in KEPT}
         self._leaning = np.zeros((num_worlds, bodies.pucks, len(mouths)), np.bool_)
         self._out = np.zeros((num_worlds, bodies.pucks), np.bool_)
         self._push = np.zeros((num_worlds, bodies.movers, 2))
@@ -63,27 +66,29 @@ class Batched(Backend):
 
     def start(self, state: State, mask: Array) -> None:
         worlds = np.flatnonzero(mask)
-        everywhere = len(worlds) == self.num_worlds
-        self.state = state if everywhere else self.state.scatter(worlds, state)
+        for name in KEPT:
+            # The array of the last step belongs to whoever was given it.
+            self._rows[name] = rows = self._rows[name].copy()
+            rows[worlds] = getattr(state, name)
         self._leaning[worlds] = False
         self._out[worlds] = False
         self._push[worlds] = 0.0
 
     def step(self, command: Command) -> State:
-        old, quiet = self.state, self._quiet
+        old, quiet = self._rows, self._quiet
         goal, told, lifted = command.velocity, self._never, self._never
         if command.told is not None:
             told = np.asarray(np.isfinite(command.told).all(-1))
-            way = command.told[..., :2] - old.paddle
+            way = command.told[..., :2] - old["position"][:, : told.shape[1]]
             way /= self.control_dt
             goal = np.where(told[..., None], way, goal)
             lifted = told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
-        position, velocity = old.position.copy(), old.velocity.copy()
+        position, velocity = old["position"].copy(), old["velocity"].copy()
         path = np.empty(self._moments)
         events = Events(
             quiet.touched.copy(),
             quiet.touched_at.copy(),
-            old.touching.copy(),
+            old["touching"].copy(),
             quiet.crossed.copy(),
             quiet.crossed_velocity.copy(),
             self._leaning,
@@ -94,19 +99,18 @@ class Batched(Backend):
         advance(self._ground, self._laws, order, motion, events)
         if command.told is not None:
             velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
-        self.state = replace(
-            quiet,
-            position=position,
-            velocity=velocity,
-            touched=events.touched,
-            touched_at=events.touched_at,
-            touching=events.touching,
-            crossed=events.crossed,
-            crossed_velocity=events.crossed_velocity,
-            time=old.time + self.control_dt,
-            path=path if self.cast.path else None,
-        )
-        return self.state
+        time = old["time"] + self.control_dt
+        new = quiet.moved(position, velocity, time, path if self.cast.path else None)
+        for name in (
+            "touched",
+            "touched_at",
+            "touching",
+            "crossed",
+            "crossed_velocity",
+        ):
+            vars(new)[name] = getattr(events, name)
+        self._rows = {name: getattr(new, name) for name in KEPT}
+        return new
 
 
 make = Batched
