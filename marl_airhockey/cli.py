@@ -95,7 +95,7 @@ def list_scenarios(
 def train(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
     seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
-    backend: Backend = "pymunk",
+    backend: Backend = "batched",
     profile: Profile = "ideal",
     steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
@@ -236,6 +236,63 @@ def watch(
     film(scenario, make_driver(driver), keywords, seed, episodes, video)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
+
+
+@app.command("bench")
+def bench_environments(
+    scenario: Annotated[str, typer.Option(help="Comma-separated.")] = "juggle",
+    backend: Annotated[str, typer.Option(help="Comma-separated.")] = "batched,pymunk",
+    worlds: Annotated[
+        str, typer.Option(help="Comma-separated; 0 is the PettingZoo dict environment.")
+    ] = "0,1,64,1024,4096",
+    rounds: Annotated[int, typer.Option(help="Turns.")] = 3,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds of a turn.")] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Draw a PNG here.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure env-steps per second; MARL_AIRHOCKEY_THREADS=N steps on N threads."""
+    from marl_airhockey.bench import Case, measure, picture
+
+    try:
+        numbers = [int(n) for n in worlds.split(",")]
+    except ValueError:
+        raise ValueError(f"--worlds: {worlds!r} must be numbers and commas") from None
+    if min(numbers) < 0 or rounds < 1 or seconds <= 0:
+        raise ValueError("--worlds, --rounds and --seconds must not be negative or 0")
+    cases = [
+        Case(s, b, n)
+        for s in scenario.split(",")
+        for b in backend.split(",")
+        for n in numbers
+    ]
+    with bar() as progress:
+        task = progress.add_task("measuring", total=rounds * len(cases), note="")
+        rates = measure(cases, rounds, seconds, lambda: progress.advance(task))
+    if out is not None:
+        need("matplotlib", "train")
+        picture(rates, out)
+    if as_json:
+        console.print_json(json.dumps([rate.to_json() for rate in rates]))
+        return
+    table = Table(
+        title=f"{rounds} turns of {seconds} CPU-s, {rates[0].threads} threads"
+    )
+    for name in ("scenario", "backend", ""):
+        table.add_column(name)
+    for name in ("env-steps per CPU-s", "agent-steps per CPU-s", "per s", "spread"):
+        table.add_column(name, justify="right")
+    for rate in rates:
+        speeds = (rate.env_steps_per_cpu_s, rate.agent_steps_per_cpu_s)
+        table.add_row(
+            rate.case.scenario,
+            rate.case.backend,
+            rate.case.name,
+            *(f"{speed:,.0f}" for speed in (*speeds, rate.env_steps_per_s)),
+            f"{rate.spread:.0%}",
+        )
+    console.print(table)
+    if out is not None:
+        console.print(f"wrote {out}")
 
 
 @app.command()

@@ -17,6 +17,7 @@ import numpy as np
 from marl_airhockey.loops import Writer, load
 from marl_airhockey.state import Array
 from marl_airhockey.symbols import Symbol, Tape
+from marl_airhockey.threads import over_rows, spreads
 
 Source = Mapping[str, Any]
 """Named arrays (B, *), and other things that do not differ between worlds."""
@@ -113,6 +114,8 @@ class _Plan:
         if self._strided:
             return self._call(self._copying, outputs, *sources)
         try:
+            if spreads(len(sources[i][key])):
+                return self._call(self._spread, outputs, *sources)
             return self._call(self._kernel, outputs, *sources)
         except TypeError:
             self._strided = True
@@ -120,6 +123,12 @@ class _Plan:
 
     def _copying(self, *arrays: Array) -> None:
         self._kernel(*[np.ascontiguousarray(a) for a in arrays])
+
+    def _spread(self, *arrays: Array) -> None:
+        def work(rows: slice) -> None:
+            self._kernel(*[array[rows] for array in arrays])
+
+        over_rows(work, len(arrays[0]))
 
     def _outputs(self, worlds: int) -> tuple[Array, ...]:
         """Fresh output arrays; for few worlds many calls' worth are made at once."""

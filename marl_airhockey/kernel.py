@@ -109,11 +109,49 @@ class Events(NamedTuple):
     """(B, pucks) whether a puck is out of play"""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
 def advance(
     ground: Ground, law: Array, order: Order, motion: Motion, events: Events
 ) -> None:
     """Move B worlds by a control step, in place; ``law`` is (B, LAWS)."""
+    # Unpacked on the way in: numba is slow to take tuples of arrays from Python.
+    _advance(*ground, law, *order, *motion, *events)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _advance(
+    paddles: int,
+    pucks: int,
+    blocks: int,
+    radius: Array,
+    lines: Array,
+    mouths: Array,
+    obstacles: Array,
+    control_dt: float,
+    substeps: int,
+    law: Array,
+    goal: Array,
+    told: Array,
+    lifted: Array,
+    position: Array,
+    velocity: Array,
+    path: Array,
+    push: Array,
+    touched: Array,
+    touched_at: Array,
+    touching: Array,
+    crossed: Array,
+    crossed_velocity: Array,
+    leaning: Array,
+    out: Array,
+) -> None:
+    ground = Ground(
+        paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, substeps
+    )
+    order = Order(goal, told, lifted)
+    motion = Motion(position, velocity, path, push)
+    events = Events(
+        touched, touched_at, touching, crossed, crossed_velocity, leaning, out
+    )
     busy = np.ones(len(law), np.bool_)
     if motion.path.shape[1] == 0:
         _find_busy(ground, law, order, motion, events, busy)

@@ -14,7 +14,7 @@ from marl_airhockey.cast import Cast
 from marl_airhockey.chipmunk import EVENT, SUBSTEP, Reader, address
 from marl_airhockey.paddles import meet
 from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
-from marl_airhockey.rails import sides, slip
+from marl_airhockey.rails import SQUEEZE, sides, slip, wall
 from marl_airhockey.state import Array
 from marl_airhockey.table import GRAVITY
 
@@ -191,8 +191,8 @@ class Space:
         self.space.gravity = (-float(pull), 0.0)
         self.space.damping = float(np.exp(-values["puck_damping"]))
         self.kick = 0.5 * self.sim_dt * float(pull)
-        for wall in self.walls:
-            wall.elasticity = values["wall_restitution"]
+        for shape in self.walls:
+            shape.elasticity = values["wall_restitution"]
         for paddle in self.paddles:
             paddle.elasticity = values["paddle_restitution"]
         for body in self.bodies[self.cast.bodies.puck]:
@@ -313,12 +313,13 @@ class Space:
                 lib.cpBodySetVelocity(body, (vx * share - self.kick, vy * share))
             puck = self.bodies[first + k]
             (x, y), table = puck.position, self.cast.table
+            if wall(self._sides, table.puck_radius, x, y, SQUEEZE) < 0:
+                continue
             paddles = self.bodies[self.cast.bodies.paddle]
             hands = np.array([paddle.position for paddle in paddles])
             radius = table.puck_radius
             free = slip(self._sides, radius, x, y, hands, radius + table.paddle_radius)
-            if free != (x, y):
-                puck.position = free
+            puck.position = free
 
     def _park(self, puck: int) -> None:
         body = self._raw[self.cast.bodies.puck.start + puck]

@@ -12,12 +12,12 @@ LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
-    | {"symbols", "loops", "fuse"},
+    | {"symbols", "loops", "fuse", "threads"},
     {"backends", "chipmunk", "space", "discs", "kernel", "registry", "registration"},
     {"sensor", "observer", "seats", "canvas", "pixels", "render", "window"}
     | {"episode", "referee", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
-    {"match", "film", "catalogue", "learn", "cli"},
+    {"match", "bench", "film", "catalogue", "learn", "cli"},
 )
 PURE = sorted(LAYERS[0] | LAYERS[1])
 EXTRAS = [

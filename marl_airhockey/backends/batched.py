@@ -12,6 +12,7 @@ from marl_airhockey.kernel import LAWS, Events, Ground, Motion, Order, advance, 
 from marl_airhockey.rails import sides
 from marl_airhockey.state import Array, State, still_state
 from marl_airhockey.table import GRAVITY
+from marl_airhockey.threads import over_rows, spreads
 
 KEPT = ("position", "velocity", "touching", "time")
 """The arrays of a state that the next step needs."""
@@ -96,7 +97,17 @@ class Batched(Backend):
         )
         order = Order(goal, told, lifted)
         motion = Motion(position, velocity, path, self._push)
-        advance(self._ground, self._laws, order, motion, events)
+
+        def work(rows: slice) -> None:
+            some = Order(*[array[rows] for array in order])
+            moved = Motion(*[array[rows] for array in motion])
+            happened = Events(*[array[rows] for array in events])
+            advance(self._ground, self._laws[rows], some, moved, happened)
+
+        if spreads(self.num_worlds):
+            over_rows(work, self.num_worlds)
+        else:
+            advance(self._ground, self._laws, order, motion, events)
         if command.told is not None:
             velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
         time = old["time"] + self.control_dt

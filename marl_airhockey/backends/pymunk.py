@@ -30,7 +30,6 @@ class Pymunk(Backend):
         self._drifts = AVAILABLE and len(cast.seats) == 1
         self.state = still_state(cast.bodies, num_worlds, len(cast.mouths))
         self._quiet = self.state
-        self._steps = np.zeros(num_worlds, np.int64)
         self._kicks = np.zeros((num_worlds, len(cast.bodies)))
         self._never = np.zeros((num_worlds, len(cast.seats)), np.bool_)
         self._eventful: list[int] = []
@@ -59,7 +58,6 @@ class Pymunk(Backend):
             position, velocity = state.position[row], state.velocity[row]
             self.spaces[i].start(position, velocity, state.angle[row])
         self._eventful = sorted({*self._eventful, *worlds.tolist()})
-        self._steps[mask] = np.round(state.time / self.control_dt).astype(np.int64)
 
     def step(self, command: Command) -> State:
         old, goal, told, lifted = self.state, command.velocity, self._never, None
@@ -71,8 +69,7 @@ class Pymunk(Backend):
             self.spaces[i].begin()
         for i in self._drift(goal, lifted is not None, position, velocity, path):
             self._finish(i, goal[i], told[i], position[i], velocity[i], path[i])
-        self._steps += 1
-        time = self._steps * self.control_dt
+        time = old.time + self.control_dt
         if self.cast.path:
             path[..., 2] += self._kicks[:, None, : path.shape[2]]
         new = self._quiet.moved(
