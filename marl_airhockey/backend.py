@@ -58,7 +58,7 @@ class Backend(ABC):
 
     @abstractmethod
     def start(self, state: State, mask: Array) -> None:
-        """Put the worlds of a mask (B,) into the rows of ``state``, in order."""
+        """Go on from ``state`` (of all B worlds); those of a mask (B,) start anew."""
 
     @abstractmethod
     def step(self, command: Command) -> State:

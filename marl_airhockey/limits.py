@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from marl_airhockey.state import Array
-from marl_airhockey.table import Seat, Table, half_planes
+from marl_airhockey.table import Seat, Table, half_planes, reaches
 
 JERK = 40.0
 """1/s: a jerk is excessive beyond this times the acceleration limit, which is a full
@@ -38,14 +38,10 @@ class Reach:
     @staticmethod
     def of(table: Table, seats: tuple[Seat, ...]) -> Reach:
         """The reaches of the seats of a table."""
-        planes = [half_planes(seat.reach) for seat in seats]
-        edges = max(len(offsets) for _, offsets in planes)
-        normals = np.zeros((len(seats), edges, 2))
-        offsets = np.full((len(seats), edges), np.inf)
+        normals, offsets = reaches(table, seats)
         share, sharpest = np.ones(len(seats)), 1.0
-        for s, (seat, (normal, offset)) in enumerate(zip(seats, planes, strict=True)):
-            normals[s, : len(offset)] = normal @ table.rotation(seat.side)
-            offsets[s, : len(offset)] = offset
+        for s, seat in enumerate(seats):
+            normal, _ = half_planes(seat.reach)
             cosine = np.einsum("kd,kd->k", normal, np.roll(normal, -1, axis=0)).min()
             share[s] = np.sqrt((1 + cosine) / 2)
             sharpest = min(sharpest, cosine)

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from marl_airhockey.cast import Cast
 from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.table import reaches
 
 TOUCH_GAP = 0.15
 """s: a touch is distinct if it begins this long after the last contact ended."""
@@ -80,6 +82,15 @@ def gained(old: Array, new: Array) -> Array:
     """What a best distance shrank by; nothing as long as there was none (infinite)."""
     none = np.isinf(old)
     return np.where(none, 0.0, np.where(none, 0.0, old) - np.where(none, 0.0, new))
+
+
+def in_reach(cast: Cast, point: Array) -> Array:
+    """(..., seats) bool: each seat's paddle can touch a puck at a point (..., 2)."""
+    normals, offsets = reaches(cast.table, cast.seats)
+    touch = cast.table.paddle_radius + cast.table.puck_radius
+    ahead = (normals * point[..., None, None, :]).sum(-1) + offsets
+    inside: Array = np.logical_and.reduce(ahead >= -touch, axis=-1)
+    return inside
 
 
 def alike(

@@ -66,6 +66,22 @@ def falling(draws: Draws, cast: Cast) -> State:
     return state
 
 
+def serve(draws: Draws, state: State, puck: int, toward: Array) -> None:
+    """Put a puck to the centre, on its way toward an end: in place.
+
+    Args:
+        draws: one stream a row.
+        state: rows (W,), paddles staying where they are.
+        puck: index of the body.
+        toward: (W,) -1 toward home, 1 toward the far end.
+    """
+    angle = draws.uniform(-0.3, 0.3)
+    state.position[:, puck] = 0.0
+    state.velocity[:, puck, 0] = 0.5 * toward * np.cos(angle)
+    state.velocity[:, puck, 1] = 0.5 * np.sin(angle)
+    state.touching[:, :, puck - state.bodies.paddles] = False
+
+
 def puck_gap(state: State) -> Array:
     """(W,) distance of paddle 0 to puck 0, m."""
     gap = state.puck[:, 0] - state.paddle[:, 0]

@@ -8,7 +8,7 @@ frame rotated so that the side's inward normal is +x.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
@@ -218,3 +218,21 @@ def half_planes(polygon: tuple[tuple[float, float], ...]) -> tuple[Array, Array]
         raise ValueError("reach: must be a convex counter-clockwise polygon")
     normals = np.stack([-ahead[:, 1], ahead[:, 0]], -1) / length
     return normals, -np.einsum("kd,kd->k", normals, corners)
+
+
+@cache
+def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
+    """Edges of the reaches of S seats in the table frame.
+
+    Returns:
+        Inward unit normals (S, K, 2), zero where a seat has fewer edges, and offsets
+        (S, K) in metres, infinite there.
+    """
+    planes = [half_planes(seat.reach) for seat in seats]
+    edges = max(len(offset) for _, offset in planes)
+    normals = np.zeros((len(seats), edges, 2))
+    offsets = np.full((len(seats), edges), np.inf)
+    for s, (seat, (normal, offset)) in enumerate(zip(seats, planes, strict=True)):
+        normals[s, : len(offset)] = normal @ table.rotation(seat.side)
+        offsets[s, : len(offset)] = offset
+    return normals, offsets

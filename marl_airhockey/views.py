@@ -190,6 +190,22 @@ class GoalVelocity(Piece):
 
 
 @dataclass(frozen=True)
+class OwnTally(Piece):
+    """The seat's own number of the memory, which holds one a seat."""
+
+    name: str
+    low: float
+    high: float
+    unit: float
+
+    def columns(self, scope: Scope) -> list[Column]:
+        return [Column(f"own_{self.name}", self.low, self.high, self.unit)]
+
+    def write(self, ego: Ego, out: Array) -> None:
+        out[..., 0] = ego.memory[self.name]
+
+
+@dataclass(frozen=True)
 class Recall(Piece):
     """Numbers of the memory, one a puck, that are no vectors: flags and heights."""
 

@@ -155,13 +155,13 @@ class World:
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put some worlds into rows of a state and a memory."""
-        self.backend.start(rows, self._mask(worlds))
         if len(worlds) == self.num_worlds:
             self.state, self.memory = rows, memory
-            return
-        self.state = replace(self.state, path=None).scatter(worlds, rows)
-        old = self.memory
-        self.memory = {k: _merged(old[k], worlds, row) for k, row in memory.items()}
+        else:
+            self.state = replace(self.state, path=None).scatter(worlds, rows)
+            old = self.memory
+            self.memory = {k: _merged(old[k], worlds, row) for k, row in memory.items()}
+        self.backend.start(self.state, self._mask(worlds))
 
     def _look(self, starting: Array | None = None) -> State:
         """Sense the state, beginning anew in some worlds, by index."""
@@ -190,7 +190,9 @@ class World:
             asked = self._delay.push(asked, values["action_delay"])
         self.asked = asked
         if not self._straight:
-            asked = (asked[..., None, :] @ self._to_ego)[..., 0, :]
+            c, s = self._to_ego[:, 0, 0], self._to_ego[:, 0, 1]
+            ahead, aside = asked[..., 0], asked[..., 1]
+            asked = np.stack([c * ahead - s * aside, s * ahead + c * aside], -1)
         sent, self._pushed, excess = limits(
             asked,
             before.position,

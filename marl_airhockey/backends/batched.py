@@ -66,14 +66,10 @@ class Batched(Backend):
         self._laws[mask] = laws(rows, self.control_dt, self.substeps)
 
     def start(self, state: State, mask: Array) -> None:
-        worlds = np.flatnonzero(mask)
-        for name in KEPT:
-            # The array of the last step belongs to whoever was given it.
-            self._rows[name] = rows = self._rows[name].copy()
-            rows[worlds] = getattr(state, name)
-        self._leaning[worlds] = False
-        self._out[worlds] = False
-        self._push[worlds] = 0.0
+        self._rows = {name: getattr(state, name) for name in KEPT}
+        self._leaning[mask] = False
+        self._out[mask] = False
+        self._push[mask] = 0.0
 
     def step(self, command: Command) -> State:
         old, quiet = self._rows, self._quiet

@@ -51,12 +51,9 @@ class Pymunk(Backend):
             self._kicks[i, self.cast.bodies.puck] = self.spaces[i].kick
 
     def start(self, state: State, mask: Array) -> None:
-        worlds = np.flatnonzero(mask)
-        everywhere = len(worlds) == self.num_worlds
-        self.state = state if everywhere else self.state.scatter(worlds, state)
-        for row, i in enumerate(worlds):
-            position, velocity = state.position[row], state.velocity[row]
-            self.spaces[i].start(position, velocity, state.angle[row])
+        self.state, worlds = state, np.flatnonzero(mask)
+        for i in worlds:
+            self.spaces[i].start(state.position[i], state.velocity[i], state.angle[i])
         self._eventful = sorted({*self._eventful, *worlds.tolist()})
 
     def step(self, command: Command) -> State:
