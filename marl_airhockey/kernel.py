@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from marl_airhockey.discs import (
+    SLOP,
     bounce,
     cap,
     meet_disc,
@@ -420,6 +421,20 @@ def _substeps(
                 push[j, 0] += back * other * nx
                 push[j, 1] += back * other * ny
 
+    def yield_to_sides() -> None:
+        # What others push into a wall stays in front of it, as the wall does not yield.
+        for i in range(paddles, movers):
+            if push[i, 0] == 0.0 and push[i, 1] == 0.0:
+                continue
+            for place in range(listed[0]):
+                c = fixed[place]
+                if c < len(lines):
+                    x, y = p[i, 0] + push[i, 0], p[i, 1] + push[i, 1]
+                    depth, nx, ny = meet_side(x, y, radius[i], lines, c)
+                    back = max(depth - SLOP, 0.0)
+                    push[i, 0] += back * nx
+                    push[i, 1] += back * ny
+
     def hold_blocks(b: int) -> None:
         for i in range(first, movers):
             speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
@@ -479,6 +494,7 @@ def _substeps(
                 # Friction acts within a contact, which has to give back its share.
                 hold_blocks(b)
                 meet_each_other(b, (step + 1) * dt)
+            yield_to_sides()
             settle(b, kick)
             list_all_if_fast()
             if path.shape[1] > 0:

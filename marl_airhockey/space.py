@@ -157,16 +157,24 @@ class Space:
         return self._read()
 
     def _touch(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        paddle, puck = arbiter.shapes
-        pair = self._shapes[paddle], self._shapes[puck]
+        pair = self._pair(arbiter, PADDLE)
         self.touched[pair] += 1
         self.touched_at[pair] = (self.flags[SUBSTEP] + 1) * self.sim_dt
         self.touching[pair] = True
         self.flags[EVENT] = 1
 
     def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        paddle, puck = arbiter.shapes
-        self.touching[self._shapes[paddle], self._shapes[puck]] = False
+        self.touching[self._pair(arbiter, PADDLE)] = False
+
+    def _pair(self, arbiter: pymunk.Arbiter, kind: int) -> tuple[int, int]:
+        """Indices of the shape of a kind and of the other: in any order of Chipmunk's.
+
+        When shapes are taken off, it may swap them.
+        """
+        a, b = arbiter.shapes
+        if a.collision_type != kind:
+            a, b = b, a
+        return self._shapes[a], self._shapes[b]
 
     def _soften(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         """Chipmunk takes the product of two restitutions, which is right for pucks."""
@@ -174,15 +182,14 @@ class Space:
         arbiter.restitution = min(a.elasticity, b.elasticity)
 
     def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        puck, mouth = arbiter.shapes
-        pair = self._shapes[puck], self._shapes[mouth]
+        pair = self._pair(arbiter, PUCK)
         body = self.bodies[self.cast.bodies.puck.start + pair[0]]
         if pair[0] in self._out:
             return
         self.crossed[pair] = True
         self.crossed_velocity[pair] = body.velocity
         self.flags[EVENT] = 1
-        if mouth.sensor:
+        if self.cast.mouths[pair[1]].width is not None:
             self._out[pair[0]] = body.position
 
     def set_physics(self, values: dict[str, float]) -> None:

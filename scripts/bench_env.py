@@ -1,18 +1,32 @@
-"""Env-steps per CPU-second of the dict environment, in turns with others in one run.
+"""Env-steps and agent-steps per CPU-second, in turns with others in one run.
 
-    python scripts/bench_env.py --rounds 5 --seconds 2
+    python scripts/bench_env.py --rounds 5 --seconds 2 \
+        --vmas X/bin/python --jaxmarl Y/bin/python
 
-Peers: a bare loop of Chipmunk's own step over the very same world (paddle velocities
-set, pucks put back as often as episodes restart), PettingZoo's multiwalker (pip install
-box2d) and mpe2's simple_tag. Actions are drawn beforehand; resets are included. Rates
-are per CPU-second of this process, which a busy machine disturbs less than wall time;
-ratios are medians over the rounds.
+One world at a time: our dict environment, a bare loop of Chipmunk's own step over the
+very same world (paddle velocities set, pucks put back as often as episodes restart),
+PettingZoo's multiwalker (pip install box2d) and mpe2's simple_tag. Many at a time: our
+arrays, and VMAS and JaxMARL, each in an interpreter of its own that works only in its
+turns, on one thread as ours does. Actions are drawn beforehand; resets are included.
+VMAS has no automatic reset: its worlds are reset all together every 100 steps, which
+costs it least. Rates are per CPU-second of the process that steps, which a busy machine
+disturbs less than wall time; ratios are medians over the rounds.
 """
 
 from __future__ import annotations
 
+import inspect
+import json
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -24,26 +38,38 @@ from rich.table import Table
 import marl_airhockey as ah
 from marl_airhockey.backends.pymunk import Pymunk
 
-Run = Callable[[int], int]
-"""Steps an environment so many times and returns how many agents it has."""
-WORLDS = 256
-CHUNK = 2 * WORLDS
-"""Steps between two looks at the clock."""
+Play = Callable[[], int]
+"""Steps for a moment and says how many env-steps that were."""
+Made = tuple[Play, int]
+"""An environment: what steps it, and its agents."""
+Turn = Callable[[float], dict[str, float]]
+"""Steps for so many CPU-seconds and says steps, agents and the CPU-seconds."""
+CHUNK = 512
+"""Steps of one world between two looks at the clock."""
+PYMUNK_WORLDS, WORLDS = 256, 4096
+ONE_THREAD = {
+    "JAX_PLATFORMS": "cpu",
+    "OMP_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
+}
+FOOTBALL = {
+    "n_blue_agents": 2,
+    "n_red_agents": 2,
+    "ai_red_agents": False,
+    "ai_blue_agents": False,
+}
+VMAS_HELP = "Its python: python -m venv X && X/bin/pip install torch vmas."
+JAX_HELP = "Its python: python -m venv Y && Y/bin/pip install jaxmarl."
 
 
-def ours(scenario: str, backend: str) -> Run:
-    """The PettingZoo environment of a scenario."""
-    return parallel(ah.parallel_env(scenario, backend=backend))
-
-
-def parallel(env: Any) -> Run:
+def parallel(env: Any) -> Made:
     """Any PettingZoo ParallelEnv with random actions."""
     env.reset(seed=0)
     rng = np.random.default_rng(0)
     agents = list(env.possible_agents)
     spaces = {agent: env.action_space(agent) for agent in agents}
     drawn: list[dict[str, Any]] = []
-    for _ in range(512):
+    for _ in range(CHUNK):
         row = {}
         for agent, space in spaces.items():
             if hasattr(space, "n"):
@@ -51,26 +77,25 @@ def parallel(env: Any) -> Run:
             else:
                 row[agent] = rng.uniform(-1, 1, space.shape).astype(np.float32)
         drawn.append(row)
-    count = 0
 
-    def run(steps: int) -> int:
-        nonlocal count
-        for _ in range(steps):
-            count += 1
-            row = drawn[count & 511]
-            live = env.agents
-            if len(live) < len(agents):
-                if not live:
+    def play() -> int:
+        for row in drawn:
+            if len(env.agents) < len(agents):
+                if not env.agents:
                     env.reset()
-                    continue
-                row = {agent: row[agent] for agent in live}
+                row = {agent: row[agent] for agent in env.agents}
             env.step(row)
-        return len(agents)
+        return CHUNK
 
-    return run
+    return play, len(agents)
 
 
-def bare(scenario: str) -> Run:
+def ours(scenario: str, backend: str) -> Made:
+    """The PettingZoo environment of a scenario."""
+    return parallel(ah.parallel_env(scenario, backend=backend))
+
+
+def bare(scenario: str) -> Made:
     """Chipmunk's step alone over the world of our environment."""
     env = ah.parallel_env(scenario)
     env.reset(seed=0)
@@ -80,111 +105,299 @@ def bare(scenario: str) -> Run:
     position, velocity = state.position[0], state.velocity[0]
     movers = len(space.bodies)
     raw, chipmunk = space.bodies[0]._body, space.space._space
-    drawn = np.random.default_rng(0).uniform(-0.7, 0.7, (512, 2)).tolist()
+    drawn = np.random.default_rng(0).uniform(-0.7, 0.7, (CHUNK, 2)).tolist()
     set_velocity, advance = lib.cpBodySetVelocity, lib.cpSpaceStep
     substeps, dt = space.substeps, space.sim_dt
     count = 0
 
-    def run(steps: int) -> int:
+    def play() -> int:
         nonlocal count
-        for _ in range(steps):
+        for vx, vy in drawn:
             count += 1
             if count % 40 == 0:
                 space.start(position[:movers], velocity[:movers], state.angle[0])
-            vx, vy = drawn[count & 511]
             set_velocity(raw, (vx if count & 1 else -vx, vy if count & 1 else -vy))
             for _ in range(substeps):
                 advance(chipmunk, dt)
-        return 1
+        return CHUNK
 
-    return run
+    return play, 1
 
 
-def batched(scenario: str) -> Run:
+def worlds(scenario: str, backend: str, number: int) -> Made:
     """Our arrays over many worlds at once, restarts included."""
-    world = ah.make_world(scenario, WORLDS)
+    world = ah.make_world(scenario, number, backend=backend)
     world.reset(0)
-    drawn = np.random.default_rng(0).uniform(-1, 1, (64, WORLDS, len(world.open), 2))
+    drawn = np.random.default_rng(0).uniform(-1, 1, (64, number, len(world.open), 2))
     count = 0
 
-    def run(steps: int) -> int:
+    def play() -> int:
         nonlocal count
-        for _ in range(steps // WORLDS):
-            count += 1
-            world.step(drawn[count & 63])
-        return len(world.open)
+        count += 1
+        world.step(drawn[count & 63])
+        return number
 
-    return run
+    return play, len(world.open)
 
 
-def multiwalker() -> Run:
+def multiwalker() -> Made:
     """PettingZoo's multiwalker: three walkers on Box2D."""
     from pettingzoo.sisl import multiwalker_v9
 
     return parallel(multiwalker_v9.parallel_env())
 
 
-def simple_tag() -> Run:
+def simple_tag() -> Made:
     """mpe2's simple_tag: four agents, numpy."""
     from mpe2 import simple_tag_v3
 
     return parallel(simple_tag_v3.parallel_env())
 
 
-def rate(run: Run, seconds: float) -> tuple[float, int]:
-    """Env-steps per CPU-second, and agents."""
-    steps, began = 0, time.process_time()
+def vmas(scenario: str, number: int, options: dict[str, Any]) -> Made:
+    """VMAS; runs in an interpreter that has it."""
+    torch = import_module("torch")
+    torch.set_num_threads(1)
+    make = import_module("vmas").make_env
+    env = make(scenario, num_envs=number, device="cpu", seed=0, **options)
+    torch.manual_seed(0)
+    drawn = [
+        [2 * torch.rand(number, *space.shape) - 1 for space in env.action_space]
+        for _ in range(100)
+    ]
+    count = 0
+
+    def play() -> int:
+        nonlocal count
+        if count % len(drawn) == 0:
+            env.reset()
+        env.step(drawn[count % len(drawn)])
+        count += 1
+        return number
+
+    return play, len(env.agents)
+
+
+def jaxmarl(scenario: str, number: int, length: int) -> Made:
+    """JaxMARL, scanned over so many steps a call; runs in an interpreter that has it.
+
+    Observations, rewards and dones are carried, so that no compiler leaves them out.
+    """
+    jax = import_module("jax")
+    env = import_module("jaxmarl").make(scenario)
+    start, *given = jax.random.split(jax.random.PRNGKey(0), 2 + env.num_agents)
+    keys = jax.random.split(given[0], (length, number))
+    actions = {
+        agent: jax.random.randint(key, (length, number), 0, env.action_space(agent).n)
+        for agent, key in zip(env.agents, given[1:], strict=True)
+    }
+    step = jax.vmap(env.step)
+
+    def advance(last: Any, row: Any) -> Any:
+        return step(row[0], last[1], row[1])[:4], None
+
+    scan = jax.jit(partial(jax.lax.scan, advance))
+    _, state = jax.vmap(env.reset)(jax.random.split(start, number))
+    last = step(keys[0], state, {a: rows[0] for a, rows in actions.items()})[:4]
+
+    def play() -> int:
+        nonlocal last
+        last = jax.block_until_ready(scan(last, (keys, actions)))[0]
+        return length * number
+
+    return play, env.num_agents
+
+
+def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
+    """A turn by this process's CPU clock; never without a step."""
+    began = time.process_time()
+    steps = play()
     while (spent := time.process_time() - began) < seconds:
-        agents = run(CHUNK)
-        steps += CHUNK
-    return steps / spent, agents
+        steps += play()
+    return {"steps": steps, "agents": agents, "cpu": spent}
+
+
+def serve(make: Callable[..., Made], *args: Any) -> None:
+    """A peer's side: a turn for every line of seconds, answered by a line of JSON."""
+    with open(os.dup(1), "w") as answers:
+        os.dup2(2, 1)  # what a peer itself prints is no answer
+        play, agents = make(*args)
+        for line in sys.stdin:
+            turn = clocked(play, agents, float(line))
+            print(json.dumps(turn), file=answers, flush=True)
+
+
+def peer(stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any) -> Turn:
+    """An environment in another interpreter, which gets the source of what it needs."""
+    program = "\n".join(
+        (
+            "from __future__ import annotations",
+            "import json, os, sys, time",
+            "from functools import partial",
+            "from importlib import import_module",
+            *(inspect.getsource(part) for part in (clocked, serve, make)),
+            f"serve({make.__name__}, *{args!r})",
+        )
+    )
+    child = stack.enter_context(
+        subprocess.Popen(
+            [python, "-I", "-c", program],
+            env=os.environ | ONE_THREAD,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+    )
+    asks, answers = child.stdin, child.stdout
+    assert asks is not None
+    assert answers is not None
+
+    def turn(seconds: float) -> dict[str, float]:
+        print(seconds, file=asks, flush=True)
+        if not (line := answers.readline()):
+            raise typer.BadParameter(f"{python}: no answer from {make.__name__}{args}")
+        found: dict[str, float] = json.loads(line)
+        return found
+
+    return turn
+
+
+@dataclass
+class Row:
+    """What is measured, warmed up when made, and what was found in each turn."""
+
+    name: str
+    turn: Turn
+    unit: str
+    """What is compared: "env-steps" with one world, "agent-steps" with many"""
+    found: list[dict[str, float]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.turn(0.0)
+
+    @property
+    def agents(self) -> int:
+        """How many."""
+        return int(self.found[0]["agents"])
+
+    def rates(self, unit: str) -> np.ndarray:
+        """Per CPU-second, a number for each turn."""
+        rates = np.array([turn["steps"] / turn["cpu"] for turn in self.found])
+        return rates * self.agents if unit == "agent-steps" else rates
+
+    def to_json(self, mine: Row) -> dict[str, Any]:
+        """Medians, and how many times faster ours is."""
+        steps = self.rates("env-steps")
+        ratio = mine.rates(self.unit) / self.rates(self.unit)
+        return {
+            "name": self.name,
+            "env_steps_per_cpu_s": float(np.median(steps)),
+            "agent_steps_per_cpu_s": float(np.median(steps)) * self.agents,
+            "agents": self.agents,
+            "spread": float(np.ptp(steps) / np.median(steps)),
+            "compared": self.unit,
+            "ours": mine.name,
+            "ours_over_this": float(np.median(ratio)),
+            "lowest": float(ratio.min()),
+            "highest": float(ratio.max()),
+        }
+
+
+def rows(
+    stack: ExitStack,
+    scenario: str,
+    vmas_python: Path | None,
+    jax_python: Path | None,
+    number: int,
+) -> list[Row]:
+    """All that can be measured here; the first of each unit is what others compare to.
+
+    Args:
+        stack: ends the peers' interpreters.
+        scenario: ours.
+        vmas_python: an interpreter that has VMAS.
+        jax_python: an interpreter that has JaxMARL.
+        number: worlds of VMAS and JaxMARL.
+    """
+    out = []
+    many = f"ours, {WORLDS} worlds, batched"
+    few = f"ours, {PYMUNK_WORLDS} worlds, pymunk"
+    here: list[tuple[str, str, Callable[[], Made]]] = [
+        ("ours, dict env, pymunk", "env-steps", lambda: ours(scenario, "pymunk")),
+        ("ours, dict env, batched", "env-steps", lambda: ours(scenario, "batched")),
+        ("bare cpSpaceStep", "env-steps", lambda: bare(scenario)),
+        ("multiwalker", "env-steps", multiwalker),
+        ("mpe2 simple_tag", "env-steps", simple_tag),
+        (many, "agent-steps", lambda: worlds(scenario, "batched", WORLDS)),
+        (few, "agent-steps", lambda: worlds(scenario, "pymunk", PYMUNK_WORLDS)),
+    ]
+    for name, unit, make in here:
+        try:
+            out.append(Row(name, partial(clocked, *make()), unit))
+        except ImportError as error:
+            print(f"{name}: left out ({error})", file=sys.stderr)
+    away: list[tuple[str, Path | None, Callable[..., Made], str, Any]] = [
+        ("VMAS football", vmas_python, vmas, "football", FOOTBALL),
+        ("VMAS simple_tag", vmas_python, vmas, "simple_tag", {}),
+        ("JaxMARL simple_tag", jax_python, jaxmarl, "MPE_simple_tag_v3", 50),
+    ]
+    for name, python, make_peer, theirs, option in away:
+        if python is not None:
+            turn = peer(stack, python, make_peer, theirs, number, option)
+            out.append(Row(f"{name}, {number} worlds", turn, "agent-steps"))
+    return out
+
+
+def show(found: list[dict[str, Any]], title: str) -> Table:
+    """A table with a line between what is compared in env-steps and in agent-steps."""
+    ours = {row["compared"]: row["ours"] for row in found}
+    told = "; ".join(f"{unit} of {name}" for unit, name in ours.items())
+    table = Table("", title=title, caption=f"ours: {told}")
+    heads = ("env-steps\nper CPU-s", "agent-steps\nper CPU-s", "agents", "spread")
+    for head in (*heads, "ours / this", "per round"):
+        table.add_column(head, justify="right")
+    for row, after in zip(found, [*found[1:], found[-1]], strict=True):
+        table.add_row(
+            row["name"],
+            f"{row['env_steps_per_cpu_s']:,.0f}",
+            f"{row['agent_steps_per_cpu_s']:,.0f}",
+            str(row["agents"]),
+            f"{row['spread']:.0%}",
+            f"{row['ours_over_this']:.3g}",
+            f"{row['lowest']:.3g}..{row['highest']:.3g}",
+            end_section=row["compared"] != after["compared"],
+        )
+    return table
+
+
+Python = partial(typer.Option, exists=True, dir_okay=False)
 
 
 def main(
     scenario: Annotated[str, typer.Option(help="Ours.")] = "juggle",
-    rounds: Annotated[int, typer.Option(help="Turns.")] = 5,
+    rounds: Annotated[int, typer.Option(help="Turns.", min=1)] = 5,
     seconds: Annotated[float, typer.Option(help="CPU-seconds a turn.")] = 2.0,
+    vmas_python: Annotated[Path | None, Python("--vmas", help=VMAS_HELP)] = None,
+    jax_python: Annotated[Path | None, Python("--jaxmarl", help=JAX_HELP)] = None,
+    peer_worlds: Annotated[
+        int, typer.Option(help="Of VMAS and JaxMARL, each.", min=1)
+    ] = 1024,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Run all in turns and print rates and ratios."""
-    makers: dict[str, Callable[[], Run]] = {
-        "ours, dict env": lambda: ours(scenario, "pymunk"),
-        f"ours, {WORLDS} worlds": lambda: batched(scenario),
-        "bare cpSpaceStep": lambda: bare(scenario),
-        "multiwalker": multiwalker,
-        "simple_tag": simple_tag,
-    }
+    with ExitStack() as stack:
+        measured = rows(stack, scenario, vmas_python, jax_python, peer_worlds)
+        for _ in range(rounds):
+            for row in measured:
+                row.found.append(row.turn(seconds))
+    mine = {row.unit: row for row in reversed(measured)}
+    found = [row.to_json(mine[row.unit]) for row in measured]
     console = Console()
-    runs: dict[str, Run] = {}
-    for name, maker in makers.items():
-        try:
-            runs[name] = maker()
-            runs[name](CHUNK)
-        except ImportError as error:
-            console.print(f"{name}: left out ({error})")
-    rates: dict[str, list[float]] = {name: [] for name in runs}
-    agents: dict[str, int] = {}
-    for _ in range(rounds):
-        for name, run in runs.items():
-            speed, agents[name] = rate(run, seconds)
-            rates[name].append(speed)
-    table = Table(title=f"{scenario}: {rounds} turns of {seconds} CPU-s")
-    heads = ("env-steps per CPU-s", "spread", "agents", "ours / this", "per round")
-    table.add_column("")
-    for head in heads:
-        table.add_column(head, justify="right")
-    mine = rates["ours, dict env"]
-    for name, found in rates.items():
-        ratio = [a / b for a, b in zip(mine, found, strict=True)]
-        middle = float(np.median(found))
-        table.add_row(
-            name,
-            f"{middle:,.0f}",
-            f"{(max(found) - min(found)) / middle:.0%}",
-            str(agents[name]),
-            f"{np.median(ratio):.3g}",
-            f"{min(ratio):.3g}..{max(ratio):.3g}",
-        )
-    console.print(table)
+    if as_json:
+        console.print_json(data=found)
+        return
+    console.width = max(console.width, 112)
+    console.print(show(found, f"{scenario}: {rounds} turns of {seconds} CPU-s"))
 
 
 if __name__ == "__main__":

@@ -8,10 +8,15 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
 
 
+def seats(scenario):
+    return len(ah.make_scenario(scenario).cast.seats)
+
+
 def pytest_generate_tests(metafunc):
     """Every test that asks for a scenario, backend or agent gets all there are."""
     found = {
         "scenario": ah.scenario_names,
+        "single": lambda: [n for n in ah.scenario_names() if seats(n) == 1],
         "backend": ah.backend_names,
         "agent": lambda: [n for n in ah.agent_names() if n != "policy"],
         "goal_scenario": lambda: GOALS,

@@ -27,6 +27,12 @@ from marl_airhockey.registry import gymnasium_id
 FLOORS = {"still": 0.01, "random": 0.10, "sticky": 0.10}
 
 
+def alone(scenario):
+    """Keywords that leave one seat open."""
+    others = range(1, len(ah.make_scenario(scenario).cast.seats))
+    return {"drivers": {f"paddle_{i}": "sticky" for i in others}}
+
+
 def rollout(world, steps, seed, policy_seed=0):
     """Observations, rewards and dones of random actions, stacked."""
     rng = np.random.default_rng(policy_seed)
@@ -80,6 +86,7 @@ def test_gymnasium_and_sb3_checks(scenario, backend):
         f"marl_airhockey:{gymnasium_id(scenario)}",
         backend=backend,
         render_mode="rgb_array",
+        **alone(scenario),
     )
     check_env(env.unwrapped)
     check_env_sb3(env.unwrapped)
@@ -131,7 +138,8 @@ def test_a_row_of_many_worlds_equals_a_single_world(scenario, backend):
 def test_observations_lie_in_their_space_and_none_is_constant(
     scenario, backend, profile
 ):
-    env = ah.make_vec(scenario, 32, backend=backend, profile=profile)
+    keywords = {"backend": backend, "profile": profile, **alone(scenario)}
+    env = ah.make_vec(scenario, 32, **keywords)
     seen, _ = env.reset(seed=0)
     rows = [seen]
     for _ in range(160):
@@ -211,10 +219,10 @@ def test_rewards_are_the_sum_of_their_terms(scenario, backend):
 
 
 @pytest.mark.parametrize("driver", list(FLOORS))
-def test_luck_does_not_succeed(scenario, backend, driver):
+def test_luck_does_not_succeed(single, backend, driver):
     keywords = {"backend": backend}
-    result = evaluate(ah.make_agent(driver), driver, scenario, 400, 0, keywords)
-    if scenario == "touch":
+    result = evaluate(ah.make_agent(driver), driver, single, 400, 0, keywords)
+    if single == "touch":
         # A falling puck meets a still paddle one time in four.
         assert 0.15 < result.success < 0.40
     else:

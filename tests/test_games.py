@@ -89,3 +89,65 @@ def test_opponents_are_seen_from_ones_own_end():
         0.5 * np.eye(2)[[0, 1]][:, :1] * 0 + [[0.5, 0.5], [0.0, 0.0]],
         atol=1e-6,
     )
+
+
+def place_puck(world, x, y, vx=0.0, vy=0.0):
+    """Put puck 0 of every world somewhere."""
+    rows = world.state.map(np.copy)
+    rows.puck[:, 0], rows.puck_velocity[:, 0] = (x, y), (vx, vy)
+    world._place(np.arange(world.num_worlds), rows, world.memory)
+    world._sensed = world._look(np.arange(world.num_worlds))
+
+
+def idle(world, seconds):
+    """Steps of worlds in which nobody moves."""
+    still = np.zeros((world.num_worlds, len(world.open), 2))
+    return [world.step(still) for _ in range(round(seconds / world.control_dt))]
+
+
+def test_a_goal_in_a_duel_pays_and_is_served_to_who_conceded(backend):
+    world = ah.make_world("duel", 4, backend=backend)
+    world.reset(0)
+    place_puck(world, 0.75, 0.0, 2.0)
+    steps = idle(world, 0.2)
+    assert sum(s.reward for s in steps).tolist() == [[1.0, -1.0]] * 4
+    assert (world.memory["goals"] == [1, 0]).all()
+    assert (world.state.puck_velocity[:, 0, 0] > 0.45).all()
+    assert (np.abs(world.state.puck[:, 0, 0]) < 0.1).all()
+    angle = np.arctan2(*world.state.puck_velocity[:, 0].T[::-1])
+    assert (np.abs(angle) <= 0.3).all()
+    assert len(np.unique(angle)) == 4
+
+
+def test_holding_the_puck_in_a_duel_is_a_foul_and_a_dead_puck_is_served(backend):
+    world = ah.make_world("duel", 2, backend=backend)
+    world.reset(0)
+    place_puck(world, -0.3, 0.15)
+    steps = idle(world, 4.95)
+    np.testing.assert_allclose(world.state.puck[:, 0], [[-0.3, 0.15]] * 2, atol=1e-6)
+    held = world.observer.layout.labels.index("own_held")
+    np.testing.assert_allclose(steps[-1].observation[:, :, held], [[4.95, 0.0]] * 2)
+    last = idle(world, 0.05)[0]
+    assert not last.reward.any()
+    np.testing.assert_allclose(world.state.puck[:, 0], 0.0)
+    assert (world.state.puck_velocity[:, 0, 0] > 0.45).all()
+    robots = ah.make_world("duel", 2, backend=backend, seats="robot")
+    robots.reset(0)
+    place_puck(robots, 0.05, 0.2)
+    idle(robots, 0.95)
+    np.testing.assert_allclose(robots.state.puck[:, 0], [[0.05, 0.2]] * 2, atol=1e-6)
+    idle(robots, 0.05)
+    np.testing.assert_allclose(robots.state.puck[:, 0], 0.0)
+
+
+def test_a_duel_ends_at_seven_goals_and_the_better_has_won(backend):
+    world = ah.make_world("duel", 2, backend=backend, options={"goals_to_win": 2})
+    world.autoreset = False
+    world.reset(0)
+    for _ in range(2):
+        place_puck(world, -0.78, 0.0, -2.0)
+        steps = idle(world, 0.1)
+    assert any(s.terminated.all() for s in steps)
+    assert world.episode.success.tolist() == [[False, True]] * 2
+    assert world.episode.returns.tolist() == [[-2.0, 2.0]] * 2
+    assert world.memory["goals"].tolist() == [[0.0, 2.0]] * 2

@@ -20,7 +20,7 @@ def test_a_picture_shows_the_paddle_where_it_is(scenario):
     row = picture.shape[0] - round((y - low[1] + 0.075) / wide * 880)
     near = np.abs(picture[row, column].astype(int) - SEAT_COLOURS[0]).max()
     assert near < 12
-    env.step({"paddle_0": np.ones(2)})
+    env.step({agent: np.ones(2) for agent in env.agents})
     assert not np.array_equal(picture, env.render())
 
 
