@@ -36,6 +36,10 @@ Options = Annotated[
     list[str] | None,
     typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
 ]
+Drivers = Annotated[
+    list[str] | None,
+    typer.Option("--driver", help="Who drives another seat, AGENT=NAME; repeatable."),
+]
 
 
 def settings(pairs: list[str] | None) -> dict[str, Any]:
@@ -56,9 +60,16 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
     return chosen
 
 
-def environment(backend: str, profile: str, option: list[str] | None) -> Keywords:
+def environment(
+    backend: str, profile: str, option: list[str] | None, driver: list[str] | None
+) -> Keywords:
     """Keywords of an environment from the options that commands share."""
-    return {"backend": backend, "profile": profile, "options": settings(option)}
+    return {
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+        "drivers": settings(driver),
+    }
 
 
 @app.command("list")
@@ -104,6 +115,7 @@ def train(
         typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
     ] = None,
     option: Options = None,
+    other: Drivers = None,
     resume: Annotated[Path | None, typer.Option(help="Go on with this run.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -118,13 +130,14 @@ def train(
             "backend": backend,
             "profile": profile,
             "options": settings(option),
+            "drivers": settings(other),
         }
         if steps is not None:
             changes["total_steps"] = steps
         config = preset(scenario, changes)
         folder = out or Path("runs") / f"{scenario}-{seed}"
     else:
-        if scenario or change or option or steps or out:
+        if scenario or change or option or other or steps or out:
             raise ValueError("--resume goes on as the run was begun: give nothing else")
         config, folder = None, resume
     with bar() as progress:
@@ -156,11 +169,12 @@ def evaluate_driver(
     episodes: Annotated[int, typer.Option(help="How many.")] = 200,
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,
     option: Options = None,
+    other: Drivers = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     as_json: AsJson = False,
 ) -> None:
     """Measure a driver over episodes that training never sees."""
-    keywords = environment(backend, profile, option)
+    keywords = environment(backend, profile, option, other)
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     seated = make_driver(driver)
@@ -228,11 +242,12 @@ def watch(
         Path | None, typer.Option(help="Write a .gif or .mp4 instead of a window.")
     ] = None,
     option: Options = None,
+    other: Drivers = None,
 ) -> None:
     """Watch a driver play, in a window or as a video."""
     from marl_airhockey.film import film
 
-    keywords = environment(backend, profile, option)
+    keywords = environment(backend, profile, option, other)
     film(scenario, make_driver(driver), keywords, seed, episodes, video)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

@@ -11,7 +11,8 @@ import numpy as np
 from PIL import Image
 
 from marl_airhockey.driver import Driver
-from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.make import Keywords
+from marl_airhockey.match import seat_world
 from marl_airhockey.render import Renderer, draw
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
@@ -54,8 +55,7 @@ def film(
         raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
     if video is not None and video.suffix not in (".gif", ".mp4"):
         raise ValueError(f"video: {video.name!r} must end in .gif or .mp4")
-    seated: Keywords = {**keywords, "drivers": {"paddle_0": driver}}
-    world = build_world(scenario, 1, autoreset=False, keywords=seated)
+    world = seat_world(driver, scenario, 1, keywords)
     mode = "human" if video is None else "rgb_array"
     renderer = Renderer(world, mode, world.scenario.name.replace("_", " "))
     fps = 1 / world.control_dt

@@ -94,6 +94,25 @@ def interval(share: float, n: int) -> tuple[float, float]:
     return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
 
 
+def seat_world(
+    driver: Driver, scenario: str | Scenario, num_worlds: int, keywords: Keywords
+) -> World:
+    """Worlds in which a driver sits at ``paddle_0`` and every seat is driven.
+
+    Raises:
+        ValueError: a seat that nobody drives, named.
+    """
+    drivers = {**keywords.get("drivers", {}), "paddle_0": driver}
+    seated: Keywords = {**keywords, "drivers": drivers}
+    world = build_world(scenario, num_worlds, autoreset=False, keywords=seated)
+    if len(world.open):
+        raise ValueError(
+            f"{world.scenario.name!r} has more seats: say who drives paddle_"
+            f"{world.open[0]}, e.g. --driver paddle_{world.open[0]}=goalkeeper"
+        )
+    return world
+
+
 def evaluate(
     driver: Driver,
     name: str,
@@ -101,7 +120,6 @@ def evaluate(
     episodes: int = 200,
     seed: int = TEST_SEED,
     keywords: Keywords | None = None,
-    others: Mapping[str, str | Driver] | None = None,
 ) -> Result:
     """Let a driver sit at ``paddle_0`` for some episodes, all at once.
 
@@ -111,12 +129,14 @@ def evaluate(
         scenario: its name, or a scenario object.
         episodes: how many; episode i is world i's first with seed + i.
         seed: of the first episode.
-        keywords: of the environment, see `make.build_world`.
-        others: drivers of the other seats.
+        keywords: of the environment, drivers of other seats among them, see
+            `make.build_world`.
+
+    Raises:
+        ValueError: a seat that nobody drives, named.
     """
     keywords = keywords if keywords is not None else {}
-    seated: Keywords = {**keywords, "drivers": {"paddle_0": driver, **(others or {})}}
-    world = build_world(scenario, episodes, autoreset=False, keywords=seated)
+    world = seat_world(driver, scenario, episodes, keywords)
     world.reset(seed)
     tally = _Tally(world)
     nobody = np.zeros((episodes, 0, 2))

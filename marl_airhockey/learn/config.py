@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from marl_airhockey.make import Keywords
 from marl_airhockey.physics import unknown
 from marl_airhockey.registry import scenario_names
 
@@ -78,7 +79,7 @@ class TrainConfig:
             )
 
     @property
-    def keywords(self) -> dict[str, Any]:
+    def keywords(self) -> Keywords:
         """The keywords of the environments."""
         return {
             "backend": self.backend,

@@ -185,6 +185,5 @@ def evaluate_model(model: Any, config: TrainConfig, deterministic: bool) -> Resu
         config.scenario,
         config.eval_episodes,
         EVAL_SEED,
-        {k: v for k, v in config.keywords.items() if k != "drivers"},  # type: ignore[arg-type]
-        config.drivers,
+        config.keywords,
     )
