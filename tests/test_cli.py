@@ -75,3 +75,22 @@ def test_mistakes_give_one_line_and_a_non_zero_exit(words, message):
     done = airhockey(*words, ok=False)
     assert message in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_bench_measures_and_draws(tmp_path):
+    picture = tmp_path / "bench.png"
+    done = airhockey(
+        *("bench", "--scenario", "juggle,duel", "--worlds", "0,3", "--rounds", "1"),
+        *("--seconds", "0.02", "--out", str(picture), "--json"),
+    )
+    rates = json.loads(done.stdout)
+    assert [(r["scenario"], r["backend"], r["worlds"]) for r in rates] == [
+        (s, b, n)
+        for s in ("juggle", "duel")
+        for b in ("batched", "pymunk")
+        for n in (0, 3)
+    ]
+    for rate in rates:
+        per_agent = rate["env_steps_per_cpu_s"] * rate["agents"]
+        assert rate["agent_steps_per_cpu_s"] == per_agent > 0
+    assert picture.stat().st_size > 10_000
