@@ -48,7 +48,11 @@ class Fused:
     def __call__(self, *sources: Source) -> tuple[Sink, ...]:
         """The sinks, for all worlds of the sources."""
         if self._plan is not None:
-            return self._plan(sources)
+            try:
+                return self._plan(sources)
+            except TypeError as error:
+                self._plan = None
+                self._refuse(error)
         plain = self._function(*sources)
         if self.refused is not None:
             return plain
@@ -57,16 +61,19 @@ class Fused:
             done = plan(sources)
             _compare(done, plain)
         except Exception as error:
-            self.refused = f"{type(error).__name__}: {error}"
-            warnings.warn(
-                f"{self._name} runs as plain numpy, which is slower, because it could "
-                f"not be compiled ({self.refused})",
-                RuntimeWarning,
-                stacklevel=2,
-            )
+            self._refuse(error)
             return plain
         self._plan = plan
         return done
+
+    def _refuse(self, error: Exception) -> None:
+        self.refused = f"{type(error).__name__}: {error}"
+        warnings.warn(
+            f"{self._name} runs as plain numpy, which is slower, because it could "
+            f"not be compiled ({self.refused})",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 class _Plan:
@@ -102,27 +109,31 @@ class _Plan:
                     self._blank.append((shape, dtype))
         self._count = next(iter(arrays))
         self._kernel, self._call = load(writer.source(len(sources)))
-        self._pool: list[tuple[Array, ...]] = []
-        self._pooled = 0
-        self._strided = False
-        """Whether some array is not laid out row behind row and must be copied."""
+        self._kinds = [arrays[name].dtype for name in writer.inputs]
+        self._kinds += [dtype for _, dtype in self._blank]
+        self._pools: dict[int, list[tuple[Array, ...]]] = {}
+        self._copied = False
+        """Whether some array is not as at the first call (rows one behind the other,
+        the same type) and must be copied."""
 
     def __call__(self, sources: tuple[Source, ...]) -> tuple[Sink, ...]:
         """Call the loop."""
         i, key = self._count
         outputs = self._outputs(len(sources[i][key]))
-        if self._strided:
+        if self._copied:
             return self._call(self._copying, outputs, *sources)
         try:
             if spreads(len(sources[i][key])):
                 return self._call(self._spread, outputs, *sources)
             return self._call(self._kernel, outputs, *sources)
         except TypeError:
-            self._strided = True
+            self._copied = True
             return self._call(self._copying, outputs, *sources)
 
     def _copying(self, *arrays: Array) -> None:
-        self._kernel(*[np.ascontiguousarray(a) for a in arrays])
+        """The loop, on copies where need be; TypeError where a number would suffer."""
+        pairs = zip(arrays, self._kinds, strict=True)
+        self._kernel(*[a.astype(k, "C", "safe", copy=False) for a, k in pairs])
 
     def _spread(self, *arrays: Array) -> None:
         def work(rows: slice) -> None:
@@ -132,13 +143,14 @@ class _Plan:
 
     def _outputs(self, worlds: int) -> tuple[Array, ...]:
         """Fresh output arrays; for few worlds many calls' worth are made at once."""
-        if worlds != self._pooled:
-            self._pool, self._pooled = [], worlds
-        if not self._pool:
-            calls = max(1, POOL // worlds)
+        if worlds >= POOL:
+            return tuple(np.empty((worlds, *s), kind) for s, kind in self._blank)
+        pool = self._pools.setdefault(worlds, [])
+        if not pool:
+            calls = POOL // worlds
             blocks = [np.empty((calls, worlds, *s), kind) for s, kind in self._blank]
-            self._pool = list(zip(*blocks, strict=True))
-        return self._pool.pop()
+            pool += zip(*blocks, strict=True)
+        return pool.pop()
 
 
 def _as_it_was(place: Array) -> tuple[int, str] | None:

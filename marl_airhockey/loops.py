@@ -59,7 +59,7 @@ class Writer:
         """Their types"""
         self._sinks: list[list[str]] = []
         self._live: set[Symbol] = set()
-        self._inputs: dict[Name, str] = {}
+        self.inputs: dict[Name, str] = {}
         """Those that are used: name -> variable"""
         self._axes: dict[Name, int] = {}
 
@@ -90,7 +90,7 @@ class Writer:
             self._live.add(symbol)
             if symbol.op == "input":
                 name, index = symbol.args
-                self._inputs.setdefault(name, f"i{len(self._inputs)}")
+                self.inputs.setdefault(name, f"i{len(self.inputs)}")
                 self._axes[name] = 1 + len(index)
             else:
                 waiting += symbol.args
@@ -101,10 +101,10 @@ class Writer:
         names = {symbol: f"t{i}" for i, symbol in enumerate(live)}
         body = [f"{names[s]} = {self._expression(s, names)}" for s in live]
         body += [f"{place} = {_named(s, names)}" for place, s in self._stores]
-        types = [_type(self._kinds[n], self._axes[n]) for n in self._inputs]
+        types = [_type(self._kinds[n], self._axes[n]) for n in self.inputs]
         outputs = [f"o{i}" for i in range(len(self._outputs))]
-        given = [_lookup(name) for name in self._inputs]
-        variables = [*self._inputs.values(), *outputs]
+        given = [_lookup(name) for name in self.inputs]
+        variables = [*self.inputs.values(), *outputs]
         sinks = ", ".join("{" + ", ".join(sink) + "}" for sink in self._sinks)
         lines = [
             '"""Written by marl_airhockey.loops; may be deleted at any time."""',
@@ -126,7 +126,7 @@ class Writer:
         op = symbol.op
         if op == "input":
             name, index = symbol.args
-            return _element(self._inputs[name], index)
+            return _element(self.inputs[name], index)
         args = [_named(a, names) for a in symbol.args]
         if op == "where":
             return f"{args[1]} if {args[0]} else {args[2]}"

@@ -91,6 +91,16 @@ def test_what_cannot_be_compiled_runs_as_it_is_and_says_so(function, reason):
     np.testing.assert_array_equal(again["y"], mine["y"])
 
 
+def test_a_number_that_changes_its_type_is_not_cut_off():
+    fused = Fused(lambda s: ({"x": s["x"] + 0.5},), "a test")
+    whole = {"x": np.zeros(2, np.int64)}
+    assert fused(whole)[0]["x"].tolist() == [0.5, 0.5]
+    assert fused({"x": np.ones(2, np.int32)})[0]["x"].tolist() == [1.5, 1.5]
+    with pytest.warns(RuntimeWarning, match="safe"):
+        done = fused({"x": np.array([0.25, 0.75])})
+    assert done[0]["x"].tolist() == [0.75, 1.25]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sorted(Pair):
     """Its success needs a sort, which is not traced."""
