@@ -274,10 +274,16 @@ def _substeps(
     ramped = np.zeros((paddles, 2))
     weight, spring = np.zeros(movers), np.ones(movers)
     away, awake = np.zeros(movers, np.bool_), np.zeros(movers, np.bool_)
-    # Which sides and obstacles anything can reach as long as nothing is faster than
-    # `bound`: the first `listed` of `fixed`.
-    fixed = np.zeros(len(lines) + len(obstacles), np.int64)
-    listed, bound = np.zeros(1, np.int64), np.zeros(1)
+    # What can meet in what is left of the step: bodies and fixed things, bodies and
+    # bodies. Listed anew after every contact, which may make something faster.
+    hard = np.zeros((movers * (len(lines) + len(obstacles)), 2), np.int64)
+    soft = np.zeros((movers * movers, 2), np.int64)
+    reach = np.zeros(movers)
+    hards, softs, fresh = (
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.bool_),
+    )
 
     def begin(b: int, kick: float) -> None:
         for i in range(movers):
@@ -296,35 +302,40 @@ def _substeps(
             else:
                 weight[i], spring[i] = 1.0 / law[b, BLOCK_MASS], law[b, BLOCK]
 
-    def list_fixed(b: int) -> None:
-        bound[0] = 2.0 * n * law[b, FALL]
+    def list_near(b: int, left: int) -> None:
         for i in range(movers):
             most = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]
             if i < paddles:
                 gx, gy = goal[b, i, 0], goal[b, i, 1]
                 most = max(most, gx * gx + gy * gy)
-            bound[0] += 2.0 * np.sqrt(most)
-        listed[0] = 0
-        for c in range(len(fixed)):
-            reached = False
-            for i in range(paddles, movers):
-                x, y, way = p[i, 0], p[i, 1], radius[i] + bound[0] * control_dt
+            shift = np.sqrt(push[i, 0] * push[i, 0] + push[i, 1] * push[i, 1])
+            reach[i] = radius[i] + shift
+            reach[i] += (np.sqrt(most) + left * law[b, FALL]) * left * dt
+            awake[i] = i < first or most > 0.0 or shift > 0.0
+            awake[i] |= law[b, FALL] > law[b, GRIP]
+        hards[0] = softs[0] = 0
+        fresh[0] = True
+        for i in range(movers):
+            x, y = p[i, 0], p[i, 1]
+            for c in range(len(lines) + len(obstacles)):
+                if i < paddles or away[i] or not awake[i]:
+                    continue
                 if c < len(lines):
-                    ahead = lines[c, 0] * x + lines[c, 1] * y + lines[c, 2]
-                    reached |= ahead < way
+                    near = lines[c, 0] * x + lines[c, 1] * y + lines[c, 2] < reach[i]
                 else:
                     o = c - len(lines)
-                    reached |= meet_obstacle(x, y, way, obstacles, o)[0] > 0.0
-            if reached:
-                fixed[listed[0]] = c
-                listed[0] += 1
-
-    def list_all_if_fast() -> None:
-        for i in range(paddles, movers):
-            if v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1] > bound[0] * bound[0]:
-                bound[0], listed[0] = np.inf, len(fixed)
-                for c in range(len(fixed)):
-                    fixed[c] = c
+                    near = meet_obstacle(x, y, reach[i], obstacles, o)[0] > 0.0
+                if near:
+                    hard[hards[0], 0], hard[hards[0], 1] = i, c
+                    hards[0] += 1
+            for j in range(max(i + 1, paddles), movers):
+                dx, dy, most = p[j, 0] - x, p[j, 1] - y, reach[i] + reach[j]
+                near = dx * dx + dy * dy < most * most and (awake[i] or awake[j])
+                if near and not (away[i] or away[j]):
+                    soft[softs[0], 0], soft[softs[0], 1] = i, j
+                    softs[0] += 1
+                elif i < paddles and j < first:
+                    touching[b, i, j - paddles] = False
 
     def drive(b: int, left: int) -> None:
         for i in range(paddles):
@@ -334,6 +345,7 @@ def _substeps(
                 p[i, axis] += v[i, axis] * dt
                 ramped[i, axis] += ramp
         if paddles > 1 and meet(p, ramped, told[b], 2 * radius[0]):
+            fresh[0] = False
             for i in range(paddles):
                 v[i, 0], v[i, 1] = ramped[i, 0], ramped[i, 1]
 
@@ -341,7 +353,6 @@ def _substeps(
         fade, fall = law[b, FADE], law[b, FALL]
         for i in range(movers):
             was[i, 0], was[i, 1] = v[i, 0], v[i, 1]
-            awake[i] = i < first or v[i, 0] != 0.0 or v[i, 1] != 0.0
             if i >= paddles and not away[i]:
                 for axis in range(2):
                     p[i, axis] += v[i, axis] * dt + push[i, axis]
@@ -349,25 +360,23 @@ def _substeps(
                 v[i, 0], v[i, 1] = v[i, 0] * fade - fall, v[i, 1] * fade
 
     def meet_fixed(b: int) -> None:
-        for i in range(paddles, movers):
-            if away[i] or not awake[i]:
-                continue
-            x, y, rest = p[i, 0], p[i, 1], min(law[b, WALL], spring[i])
-            for place in range(listed[0]):
-                c = fixed[place]
-                if c < len(lines):
-                    depth, nx, ny = meet_side(x, y, radius[i], lines, c)
-                else:
-                    o = c - len(lines)
-                    depth, nx, ny = meet_obstacle(x, y, radius[i], obstacles, o)
-                if depth > 0.0:
-                    before = nx * was[i, 0] + ny * was[i, 1]
-                    gain = bounce(before, nx * v[i, 0] + ny * v[i, 1], rest)
-                    back = take_back(depth, nx * push[i, 0] + ny * push[i, 1])
-                    v[i, 0] += gain * nx
-                    v[i, 1] += gain * ny
-                    push[i, 0] += back * nx
-                    push[i, 1] += back * ny
+        for place in range(hards[0]):
+            i, c = hard[place, 0], hard[place, 1]
+            if c < len(lines):
+                depth, nx, ny = meet_side(p[i, 0], p[i, 1], radius[i], lines, c)
+            else:
+                o = c - len(lines)
+                depth, nx, ny = meet_obstacle(p[i, 0], p[i, 1], radius[i], obstacles, o)
+            if depth > 0.0:
+                fresh[0] = False
+                before = nx * was[i, 0] + ny * was[i, 1]
+                rest = min(law[b, WALL], spring[i])
+                gain = bounce(before, nx * v[i, 0] + ny * v[i, 1], rest)
+                back = take_back(depth, nx * push[i, 0] + ny * push[i, 1])
+                v[i, 0] += gain * nx
+                v[i, 1] += gain * ny
+                push[i, 0] += back * nx
+                push[i, 1] += back * ny
 
     def cross(b: int, kick: float) -> None:
         for m in range(len(mouths)):
@@ -391,49 +400,47 @@ def _substeps(
                     crossed_velocity[b, k, m, 1] = was[i, 1]
 
     def meet_each_other(b: int, time: float) -> None:
-        for i in range(movers - 1):
-            for j in range(max(i + 1, paddles), movers):
-                depth, nx, ny = -1.0, 1.0, 0.0
-                if (awake[i] or awake[j]) and not (away[i] or away[j]):
-                    dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
-                    depth, nx, ny = meet_disc(dx, dy, radius[i] + radius[j])
-                if i < paddles and j < first:
-                    k, meets = j - paddles, depth > 0.0
-                    if meets and not touching[b, i, k]:
-                        touched[b, i, k] += 1
-                        touched_at[b, i, k] = time
-                    touching[b, i, k] = meets
-                if depth <= 0.0:
-                    continue
-                share = weight[i] / (weight[i] + weight[j])
-                other = 1.0 - share
-                before = nx * (was[j, 0] - was[i, 0]) + ny * (was[j, 1] - was[i, 1])
-                now = nx * (v[j, 0] - v[i, 0]) + ny * (v[j, 1] - v[i, 1])
-                taken = nx * (push[j, 0] - push[i, 0]) + ny * (push[j, 1] - push[i, 1])
-                gain = bounce(before, now, min(spring[i], spring[j]))
-                back = take_back(depth, taken)
-                v[i, 0] -= gain * share * nx
-                v[i, 1] -= gain * share * ny
-                v[j, 0] += gain * other * nx
-                v[j, 1] += gain * other * ny
-                push[i, 0] -= back * share * nx
-                push[i, 1] -= back * share * ny
-                push[j, 0] += back * other * nx
-                push[j, 1] += back * other * ny
+        for place in range(softs[0]):
+            i, j = soft[place, 0], soft[place, 1]
+            depth, nx, ny = -1.0, 1.0, 0.0
+            if not (away[i] or away[j]):
+                dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
+                depth, nx, ny = meet_disc(dx, dy, radius[i] + radius[j])
+            if i < paddles and j < first:
+                k, meets = j - paddles, depth > 0.0
+                if meets and not touching[b, i, k]:
+                    touched[b, i, k] += 1
+                    touched_at[b, i, k] = time
+                touching[b, i, k] = meets
+            if depth <= 0.0:
+                continue
+            fresh[0] = False
+            share = weight[i] / (weight[i] + weight[j])
+            other = 1.0 - share
+            before = nx * (was[j, 0] - was[i, 0]) + ny * (was[j, 1] - was[i, 1])
+            now = nx * (v[j, 0] - v[i, 0]) + ny * (v[j, 1] - v[i, 1])
+            taken = nx * (push[j, 0] - push[i, 0]) + ny * (push[j, 1] - push[i, 1])
+            gain = bounce(before, now, min(spring[i], spring[j]))
+            back = take_back(depth, taken)
+            v[i, 0] -= gain * share * nx
+            v[i, 1] -= gain * share * ny
+            v[j, 0] += gain * other * nx
+            v[j, 1] += gain * other * ny
+            push[i, 0] -= back * share * nx
+            push[i, 1] -= back * share * ny
+            push[j, 0] += back * other * nx
+            push[j, 1] += back * other * ny
 
     def yield_to_sides() -> None:
         # What others push into a wall stays in front of it, as the wall does not yield.
-        for i in range(paddles, movers):
-            if push[i, 0] == 0.0 and push[i, 1] == 0.0:
-                continue
-            for place in range(listed[0]):
-                c = fixed[place]
-                if c < len(lines):
-                    x, y = p[i, 0] + push[i, 0], p[i, 1] + push[i, 1]
-                    depth, nx, ny = meet_side(x, y, radius[i], lines, c)
-                    back = max(depth - SLOP, 0.0)
-                    push[i, 0] += back * nx
-                    push[i, 1] += back * ny
+        for place in range(hards[0]):
+            i, c = hard[place, 0], hard[place, 1]
+            if c < len(lines) and (push[i, 0] != 0.0 or push[i, 1] != 0.0):
+                x, y = p[i, 0] + push[i, 0], p[i, 1] + push[i, 1]
+                depth, nx, ny = meet_side(x, y, radius[i], lines, c)
+                back = max(depth - SLOP, 0.0)
+                push[i, 0] += back * nx
+                push[i, 1] += back * ny
 
     def hold_blocks(b: int) -> None:
         for i in range(first, movers):
@@ -481,7 +488,7 @@ def _substeps(
             continue
         kick = 0.5 * law[b, FALL]
         begin(b, kick)
-        list_fixed(b)
+        list_near(b, n)
         if path.shape[1] > 0:
             record(b, 0, kick)
         for step in range(n):
@@ -496,7 +503,8 @@ def _substeps(
                 meet_each_other(b, (step + 1) * dt)
             yield_to_sides()
             settle(b, kick)
-            list_all_if_fast()
+            if not fresh[0]:
+                list_near(b, n - step - 1)
             if path.shape[1] > 0:
                 record(b, step + 1, kick)
         finish(b, kick)
