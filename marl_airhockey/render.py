@@ -226,7 +226,10 @@ class Renderer:
         memory = {name: value[i] for name, value in world.memory.items()}
         episode = world.episode
         note = f"{float(state.time):4.1f} s   return {episode.returns[i, 0]:+.2f}"
-        if "touches" in memory:
+        if "goals" in memory:
+            score = " : ".join(f"{goals:.0f}" for goals in memory["goals"])
+            note = f"goals {score}   {float(state.time):4.1f} s"
+        elif "touches" in memory:
             note = f"touches {int(memory['touches'].sum())}   {note}"
         return Scene(
             cast=world.cast,
