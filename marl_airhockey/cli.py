@@ -109,6 +109,9 @@ def train(
     backend: Backend = "batched",
     profile: Profile = "ideal",
     steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+    hidden: Annotated[
+        int | None, typer.Option(help="Units of both layers; the paper's size is 256.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
     change: Annotated[
         list[str] | None,
@@ -134,10 +137,12 @@ def train(
         }
         if steps is not None:
             changes["total_steps"] = steps
+        if hidden is not None:
+            changes["hidden"] = [hidden, hidden]
         config = preset(scenario, changes)
         folder = out or Path("runs") / f"{scenario}-{seed}"
     else:
-        if scenario or change or option or other or steps or out:
+        if scenario or change or option or other or steps or hidden or out:
             raise ValueError("--resume goes on as the run was begun: give nothing else")
         config, folder = None, resume
     with bar() as progress:
