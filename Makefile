@@ -20,7 +20,7 @@ $(READY): pyproject.toml constraints.txt
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,dev]'
 	touch $@
 
-demo: setup ## Train a paddle to juggle and show it (three minutes)
+demo: setup ## Train a paddle to juggle and show it (a minute)
 	$(BIN)/airhockey demo
 
 test: setup lint ## Run linters, types and the tests that are not slow
