@@ -1,17 +1,30 @@
 """The batched 2D table: one control step of B worlds in one compiled loop.
 
 A world in which nothing can meet within the step coasts through it in closed form; any
-other is stepped substep by substep (`discs`). Both give the same numbers but for
-rounding, so that most steps cost a few distances.
+other is stepped substep by substep by the laws of `discs`. Both give the same numbers
+but for rounding, so that most steps cost a few distances.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
+from marl_airhockey.batch import (
+    BLOCK,
+    BLOCK_MASS,
+    FADE,
+    FALL,
+    GRIP,
+    PADDLE,
+    PUCK_MASS,
+    WALL,
+    Events,
+    Ground,
+    Motion,
+    Order,
+)
+from marl_airhockey.coast import coast, find_busy
 from marl_airhockey.discs import (
     SLOP,
     bounce,
@@ -27,87 +40,6 @@ from marl_airhockey.paddles import meet
 from marl_airhockey.physics import PUCK_SPEED_CAP
 from marl_airhockey.rails import SQUEEZE, slip, wall
 from marl_airhockey.state import Array
-
-FALL, FADE, COAST_FADE, COAST_FALL, COAST_WAY, COAST_DROP = range(6)
-WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, GRIP = range(6, 12)
-LAWS = 12
-"""Columns of a world's laws: what a substep takes from a puck's vx (m/s) and leaves of
-its speed (1); the same for a whole step and its way (s) and drop (m); restitutions,
-masses (kg) and what friction takes from a block in a substep (m/s)."""
-
-
-def laws(values: dict[str, Array], control_dt: float, substeps: int) -> Array:
-    """(B, LAWS) from physical parameters (B,) each, ``pull`` (m/s2) among them."""
-    dt = control_dt / substeps
-    fall, fade = values["pull"] * dt, np.exp(-values["puck_damping"] * dt)
-    # x and v are linear in the first v: the sums of substeps with v = 1 and v = 0.
-    speed, drop = np.ones_like(fall), np.zeros_like(fall)
-    way, lost = np.zeros_like(fall), np.zeros_like(fall)
-    for _ in range(substeps):
-        way, lost = way + speed * dt, lost + drop * dt
-        speed, drop = speed * fade, drop * fade - fall
-    names = ("wall_restitution", "paddle_restitution", "block_restitution")
-    rest = [values[n] for n in (*names, "puck_mass", "block_mass")]
-    grip = values["block_friction"] * dt
-    return np.stack([fall, fade, speed, drop, way, lost, *rest, grip], axis=-1)
-
-
-class Ground(NamedTuple):
-    """What all worlds of a batch share."""
-
-    paddles: int
-    pucks: int
-    blocks: int
-    radius: Array
-    """(N,) m"""
-    lines: Array
-    """`rails.sides`"""
-    mouths: Array
-    """(M, 2) side of each mouth, and 1 if it is that whole side"""
-    obstacles: Array
-    """(O, 5) see `discs.meet_obstacle`"""
-    control_dt: float
-    """s"""
-    substeps: int
-
-
-class Order(NamedTuple):
-    """What the paddles of B worlds do in a step."""
-
-    goal: Array
-    """(B, paddles, 2) m/s at the end of the step; of a told one, all along"""
-    told: Array
-    """(B, paddles) moves at its velocity and does not yield"""
-    lifted: Array
-    """(B, paddles) touches nothing"""
-
-
-class Motion(NamedTuple):
-    """Where everything is and goes: changed in place."""
-
-    position: Array
-    """(B, N, 2) m"""
-    velocity: Array
-    """(B, N, 2) m/s"""
-    path: Array
-    """(B, substeps + 1, movers, 4) x, y, vx, vy, or (B, 0, movers, 4) if not wanted"""
-    push: Array
-    """(B, movers, 2) m: what the next substep takes back of overlaps"""
-
-
-class Events(NamedTuple):
-    """What happened to pucks, and what outlasts a step: changed in place."""
-
-    touched: Array
-    """(B, paddles, pucks) see `State`, as the next four"""
-    touched_at: Array
-    touching: Array
-    crossed: Array
-    crossed_velocity: Array
-    leaning: Array
-    """(B, pucks, M) whether a puck touches the wall that is a mouth"""
-    out: Array
-    """(B, pucks) whether a puck is out of play"""
 
 
 def advance(
@@ -155,97 +87,9 @@ def _advance(
     )
     busy = np.ones(len(law), np.bool_)
     if motion.path.shape[1] == 0:
-        _find_busy(ground, law, order, motion, events, busy)
-        _coast(ground, law, order, motion, events, busy)
+        find_busy(ground, law, order, motion, events, busy)
+        coast(ground, law, order, motion, events, busy)
     _substeps(ground, law, order, motion, events, busy)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _find_busy(
-    ground: Ground,
-    law: Array,
-    order: Order,
-    motion: Motion,
-    events: Events,
-    busy: Array,
-) -> None:
-    """In which worlds bodies may meet anything within the step.
-
-    A body stays within a disc about its place, of the way that it can go at most.
-    """
-    paddles, pucks, blocks, radius, lines, _, obstacles, control_dt, n = ground
-    position, velocity, _, push = motion
-    goal, out = order.goal, events.out
-    first, movers = paddles + pucks, paddles + pucks + blocks
-    way = np.zeros(movers)
-    for b in range(len(law)):
-        met, fall = False, law[b, FALL] * n
-        for i in range(movers):
-            vx, vy = velocity[b, i, 0], velocity[b, i, 1]
-            most, extra = vx * vx + vy * vy, 0.0
-            if i < paddles:
-                gx, gy = goal[b, i, 0], goal[b, i, 1]
-                most = max(most, gx * gx + gy * gy)
-            elif i < first:
-                # A puck out of play meets nothing.
-                extra = -np.inf if out[b, i - paddles] else fall
-            else:
-                met |= most > 0.0 or law[b, FALL] > law[b, GRIP]
-                met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
-            way[i] = radius[i] + (np.sqrt(most) + extra) * control_dt
-        for i in range(paddles, first):
-            x, y = position[b, i, 0], position[b, i, 1]
-            for s in range(len(lines)):
-                met |= lines[s, 0] * x + lines[s, 1] * y + lines[s, 2] < way[i]
-            for o in range(len(obstacles)):
-                met |= meet_obstacle(x, y, way[i], obstacles, o)[0] > 0.0
-        for i in range(first):
-            for j in range(i + 1, movers):
-                dx = position[b, j, 0] - position[b, i, 0]
-                dy = position[b, j, 1] - position[b, i, 1]
-                reach = max(way[i] + way[j], 0.0)
-                met |= dx * dx + dy * dy < reach * reach
-        busy[b] = met
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _coast(
-    ground: Ground,
-    law: Array,
-    order: Order,
-    motion: Motion,
-    events: Events,
-    busy: Array,
-) -> None:
-    """The others in closed form: paddles on their ramps, pucks in free flight."""
-    paddles, pucks, _, _, _, mouths, _, control_dt, _ = ground
-    position, velocity, goal = motion.position, motion.velocity, order.goal
-    touching, leaning, out = events.touching, events.leaning, events.out
-    for b in range(len(law)):
-        if busy[b]:
-            continue
-        for i in range(paddles):
-            for axis in range(2):
-                start = velocity[b, i, axis]
-                start = goal[b, i, axis] if order.told[b, i] else start
-                mean = 0.5 * (start + goal[b, i, axis])
-                position[b, i, axis] += mean * control_dt
-                velocity[b, i, axis] = goal[b, i, axis]
-        kick = 0.5 * law[b, FALL]
-        for k in range(pucks):
-            i = paddles + k
-            for j in range(paddles):
-                touching[b, j, k] = False
-            for m in range(len(mouths)):
-                leaning[b, k, m] = False
-            if out[b, k]:
-                velocity[b, i, 0] = velocity[b, i, 1] = 0.0
-                continue
-            vx, vy = velocity[b, i, 0] - kick, velocity[b, i, 1]
-            position[b, i, 0] += law[b, COAST_WAY] * vx + law[b, COAST_DROP]
-            position[b, i, 1] += law[b, COAST_WAY] * vy
-            velocity[b, i, 0] = law[b, COAST_FADE] * vx + law[b, COAST_FALL] + kick
-            velocity[b, i, 1] = law[b, COAST_FADE] * vy
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

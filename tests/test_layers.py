@@ -13,7 +13,17 @@ LAYERS = (
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
     | {"symbols", "loops", "fuse", "threads"},
-    {"backends", "chipmunk", "space", "discs", "kernel", "registry", "registration"},
+    {
+        "backends",
+        "chipmunk",
+        "space",
+        "batch",
+        "discs",
+        "coast",
+        "kernel",
+        "registry",
+        "registration",
+    },
     {"sensor", "observer", "seats", "canvas", "pixels", "render", "window"}
     | {"episode", "referee", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},

@@ -7,8 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from marl_airhockey.backend import TOLD_SPEED, Backend, Command
+from marl_airhockey.batch import LAWS, Events, Ground, Motion, Order, laws
 from marl_airhockey.cast import Cast
-from marl_airhockey.kernel import LAWS, Events, Ground, Motion, Order, advance, laws
+from marl_airhockey.kernel import advance
 from marl_airhockey.rails import sides
 from marl_airhockey.state import Array, State, still_state
 from marl_airhockey.table import GRAVITY
