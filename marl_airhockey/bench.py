@@ -120,12 +120,16 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
 
     world = make_world(case.scenario, case.worlds, backend=case.backend)
     world.reset(0)
+    turns = max(1, min(DRAWN, 4096 // case.worlds))
     drawn = rng.uniform(-1, 1, (DRAWN, case.worlds, len(world.open), 2))
+    count = 0
 
     def step() -> int:
-        for actions in drawn:
-            world.step(actions)
-        return DRAWN * case.worlds
+        nonlocal count
+        for _ in range(turns):
+            count += 1
+            world.step(drawn[count % DRAWN])
+        return turns * case.worlds
 
     step()
     return step, len(world.open)
