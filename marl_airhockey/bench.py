@@ -145,12 +145,11 @@ def _rate(run: Callable[[], int], seconds: float) -> tuple[float, float]:
 
 def picture(rates: Sequence[Rate], path: Path) -> None:
     """Env-steps per CPU-second against the number of worlds, a line for each."""
-    import matplotlib
-
-    matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(7.2, 4.4), dpi=130, layout="constrained")
+    from marl_airhockey.charts import DPI, save, tidy
+
+    figure, axes = plt.subplots(figsize=(7.2, 4.4), dpi=DPI, layout="constrained")
     names = {(r.case.scenario, r.case.backend) for r in rates}
     for scenario, backend in sorted(names):
         mine = [
@@ -167,9 +166,5 @@ def picture(rates: Sequence[Rate], path: Path) -> None:
     axes.set(
         xscale="log", yscale="log", xlabel="worlds", ylabel="env-steps per CPU-second"
     )
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(alpha=0.25)
-    axes.legend(frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
-    plt.close(figure)
+    tidy(axes)
+    save(figure, path)

@@ -2,18 +2,19 @@
 
     python scripts/bench_scaling.py --out docs/images/scaling.png
 
-Whole env-steps of `juggle` against the number of worlds; physics alone, in 1024 worlds,
-against pucks, blocks and paddles. CPU time, median over turns.
+Whole env-steps of `juggle` against the number of worlds, restarts included; physics
+alone, in 1024 worlds that are put back every 20 steps, against pucks, blocks and
+paddles. CPU time of this process; all cases take turns, medians over the rounds.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import typer
 from rich.console import Console
@@ -22,136 +23,146 @@ from rich.table import Table
 import marl_airhockey as ah
 from marl_airhockey.backend import Command
 from marl_airhockey.cast import Cast
+from marl_airhockey.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.physics import PARAMETERS
 from marl_airhockey.registry import find_backend
 from marl_airhockey.starts import first_state
 from marl_airhockey.table import TABLES, make_seat
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
-Turn = Callable[[], float]
-"""Steps for a while and gives nanoseconds of CPU for a step of one world."""
+Play = Callable[[], tuple[float, int]]
+"""Steps for a moment: CPU-seconds and calls."""
 WORLDS = (1, 4, 16, 64, 256, 1024, 4096, 16384, 65536)
-BATCH = 1024
-LAPSE = 20
-"""Steps between two fresh starts."""
+BATCH, LAPSE, SIGN = 1024, 20, 4
+"""Worlds of physics alone; steps between two starts, and until paddles turn back."""
+ROWS = np.linspace(-0.3, 0.3, 4)
+PADDLES = [(x, y) for x in (-0.8, -0.6) for y in ROWS]
+PUCKS = [(x, y) for x in (-0.35, -0.2) for y in ROWS[[1, 2, 0, 3]]]
+BLOCKS = [(x, y) for x in np.linspace(0, 0.8, 6) for y in np.linspace(-0.25, 0.25, 5)]
+"""m: where bodies start, apart from each other; the first so many are used."""
+AIM = np.pi / 6
+"""rad: up to so far from straight at the blocks."""
 
 
-def whole(worlds: int) -> Turn:
-    """A whole env-step: physics, rules, observation, restarts."""
+def whole(worlds: int) -> Play:
+    """Env-steps of `juggle`: physics, rules, observations and restarts."""
     world = ah.make_world("juggle", worlds, backend="batched")
     world.reset(0)
     drawn = np.random.default_rng(0).uniform(-1, 1, (16, worlds, 1, 2))
+    for k in range(100):  # compiles, and lets episodes fall out of step
+        world.step(drawn[k % 16])
+    calls = max(16, 4096 // worlds)
 
-    def turn() -> float:
-        steps, began = 0, time.process_time()
-        while steps < 16 or steps * worlds < 100_000:
-            world.step(drawn[steps % 16])
-            steps += 1
-        return (time.process_time() - began) / steps / worlds * 1e9
+    def play() -> tuple[float, int]:
+        began = time.process_time()
+        for k in range(calls):
+            world.step(drawn[k % 16])
+        return time.process_time() - began, calls
 
-    return turn
+    return play
 
 
-def physics(paddles: int, pucks: int, blocks: int, still: bool = False) -> Turn:
-    """Physics alone of discs spread over the full-size table."""
+def physics(
+    paddles: int, pucks: int, blocks: int = 0, spread: float = np.pi, top: float = 1.0
+) -> Play:
+    """Physics alone on the full-size table.
+
+    Pucks fly at about ``top`` m/s, up to ``spread`` rad from straight at the blocks.
+    """
     table = TABLES["full_size"]
-    seats = (make_seat("arcade", table, 0),) * paddles
+    seats = (make_seat("arcade", table, side=0),) * paddles
     cast = Cast(table, seats, pucks=pucks, blocks=blocks, block_radius=0.0277)
-    backend = find_backend("batched")(cast, BATCH, 0.05, 10)
+    kind = find_backend("batched")
+    backend = kind(cast, BATCH, 0.05, kind.default_substeps)
+    everywhere = np.arange(BATCH)
     values = {name: np.full(BATCH, p.default) for name, p in PARAMETERS.items()}
-    values["tilt"][:] = 0.0
-    backend.set_physics(values, np.ones(BATCH, np.bool_))
-    rng, state = np.random.default_rng(0), first_state(cast, BATCH)
-    columns = [(x, y) for x in (-0.8, -0.6) for y in (-0.3, -0.1, 0.1, 0.3)]
-    middle = [(x, y) for x in (-0.35, -0.2) for y in (-0.3, -0.1, 0.1, 0.3)]
-    far = [
-        (x, y) for x in (0.1, 0.25, 0.4, 0.55, 0.7) for y in np.linspace(-0.3, 0.3, 6)
-    ]
-    places = columns[:paddles] + middle[:pucks] + far[:blocks]
-    state.position[:] = places
-    if not still:
-        angle = rng.uniform(0, 2 * np.pi, (BATCH, pucks))
-        way = np.stack([np.cos(angle), np.sin(angle)], -1)
-        state.velocity[:, paddles : paddles + pucks] = way
-    reach = 0.0 if still else 0.5
-    drawn = reach * rng.uniform(-1, 1, (2, BATCH, paddles, 2))
+    backend.set_physics({**values, "tilt": np.zeros(BATCH)}, everywhere)
+    state, rng = first_state(cast, BATCH), np.random.default_rng(0)
+    state.position[:] = PADDLES[:paddles] + PUCKS[:pucks] + BLOCKS[:blocks]
+    angle = rng.uniform(-spread, spread, (BATCH, pucks))
+    speed = top * rng.uniform(0.8, 1.2, (BATCH, pucks, 1))
+    way = np.stack([np.cos(angle), np.sin(angle)], -1)
+    state.velocity[:, paddles : paddles + pucks] = speed * way
+    there = 0.5 * top * rng.uniform(-1, 1, (BATCH, paddles, 2))
+    orders = Command(there), Command(-there)
 
-    def turn() -> float:
-        spent, steps = 0.0, 0
-        while steps < 5 * LAPSE:
-            backend.start(state, np.ones(BATCH, np.bool_))
-            began = time.process_time()
-            for k in range(LAPSE):
-                backend.step(Command(drawn[k // 4 % 2] * (1 if k % 8 < 4 else -1)))
-            spent += time.process_time() - began
-            steps += LAPSE
-        return spent / steps / BATCH * 1e9
+    def play() -> tuple[float, int]:
+        backend.start(state, everywhere)
+        began = time.process_time()
+        for k in range(LAPSE):
+            backend.step(orders[k // SIGN % 2])
+        return time.process_time() - began, LAPSE
 
-    return turn
+    play()
+    return play
+
+
+def clocked(play: Play, seconds: float) -> float:
+    """CPU-seconds of a call, over a turn of so many; never without a call."""
+    spent, calls = play()
+    while spent < seconds:
+        more, steps = play()
+        spent, calls = spent + more, calls + steps
+    return spent / calls
+
+
+def draw(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
+    """A panel for each thing that grows; ``costs`` in ns per step of a world."""
+    figure, grid = plt.subplots(2, 2, figsize=(8.4, 6.2), dpi=DPI, layout="constrained")
+    panels = dict.fromkeys(name for name, _ in costs)
+    for axes, panel in zip(grid.flat, panels, strict=True):
+        lines = {case: rows for (name, case), rows in costs.items() if name == panel}
+        for (case, rows), ink in zip(lines.items(), (INK, INKS[-1]), strict=False):
+            axes.plot(
+                *zip(*rows.items(), strict=True), "o-", ms=4, color=ink, label=case
+            )
+        rows = next(iter(lines.values()))
+        numbers, times = np.array(list(rows)), list(rows.values())
+        straight, label = times[0] * numbers, "linear from the first"
+        what, unit = "Physics alone", "world-step"
+        axes.set_xlabel(f"{panel} in a world")
+        if panel == "worlds":
+            straight, label = np.full(len(rows), times[0]), "B calls of one world"
+            what, unit = "Whole env-step of juggle", "env-step"
+            axes.set(xscale="log", yscale="log", xlabel="worlds B in a call of step")
+        else:
+            if panel == "blocks":
+                straight = times[0] + (times[1] - times[0]) / numbers[1] * numbers
+                label = "linear from the first two"
+            axes.set_ylim(0, None)
+        axes.plot(numbers, straight, ":", color=INKS[0], label=label)
+        axes.set(ylabel=f"CPU, ns per {unit}", title=f"{what}, by {panel}")
+        tidy(axes)
+    save(figure, out)
 
 
 def main(
-    rounds: Annotated[int, typer.Option(help="Turns.")] = 5,
+    rounds: Annotated[int, typer.Option(min=1, help="Turns of every case.")] = 7,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds per point.")] = 1.0,
     out: Annotated[Path, typer.Option(help="The picture.")] = Path(
         "docs/images/scaling.png"
     ),
 ) -> None:
     """Measure all cases in turns, print and draw them."""
-    counts, some = range(1, 9), (0, 1, 2, 5, 10, 15, 20, 25, 30)
-    cases: dict[tuple[str, str], dict[int, Turn]] = {
-        ("worlds", "whole env-step"): {n: whole(n) for n in WORLDS},
-        ("pucks", "physics"): {n: physics(1, n, 0) for n in counts},
-        ("blocks", "puck among them"): {n: physics(1, 1, n) for n in some},
-        ("blocks", "all at rest"): {n: physics(1, 1, n, still=True) for n in some},
-        ("paddles", "physics"): {n: physics(n, 1, 0) for n in counts},
+    some, many = range(1, 9), range(0, 31, 5)
+    cases: dict[tuple[str, str], dict[int, Play]] = {
+        ("worlds", "1 paddle, 1 puck"): {n: whole(n) for n in WORLDS},
+        ("pucks", "1 paddle, n pucks"): {n: physics(1, n) for n in some},
+        ("blocks", "puck flies at them"): {n: physics(1, 1, n, AIM) for n in many},
+        ("blocks", "all at rest"): {n: physics(1, 1, n, top=0.0) for n in many},
+        ("paddles", "n paddles, 1 puck"): {n: physics(n, 1) for n in some},
     }
-    found: dict[tuple[str, str], dict[int, list[float]]] = {
-        key: {n: [] for n in turns} for key, turns in cases.items()
-    }
-    for _ in range(rounds + 1):
-        for key, turns in cases.items():
-            for n, turn in turns.items():
-                found[key][n].append(turn())
-    # The first turn compiles.
-    costs = {
-        key: {n: float(np.median(times[1:])) for n, times in rows.items()}
-        for key, rows in found.items()
-    }
-    table = Table("against", "case", "ns of CPU per step of a world")
-    for (against, case), rows in costs.items():
-        cells = "  ".join(f"{n}: {cost:,.0f}" for n, cost in rows.items())
-        table.add_row(against, case, cells)
+    found = {(key, n): np.zeros(rounds) for key in cases for n in cases[key]}
+    for turn in range(rounds):
+        for key, n in found:
+            found[key, n][turn] = clocked(cases[key][n], seconds / rounds)
+    table = Table("against", "case", "number", "us per call", "ns per world-step")
+    costs: dict[tuple[str, str], dict[int, float]] = {key: {} for key in cases}
+    for (key, n), times in found.items():
+        call, worlds = float(np.median(times)), n if key[0] == "worlds" else BATCH
+        costs[key][n] = call / worlds * 1e9
+        table.add_row(*key, f"{n}", f"{call * 1e6:,.1f}", f"{costs[key][n]:,.0f}")
     Console().print(table)
     draw(costs, out)
-
-
-def draw(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
-    """One panel for each thing that grows."""
-    panels: Sequence[str] = ("worlds", "pucks", "blocks", "paddles")
-    figure, grid = plt.subplots(2, 2, figsize=(8.4, 5.6), dpi=130, layout="constrained")
-    inks = ("#0072B2", "#00805c")
-    for axes, panel in zip(grid.flat, panels, strict=True):
-        lines = {case: rows for (name, case), rows in costs.items() if name == panel}
-        for (case, rows), ink in zip(lines.items(), inks, strict=False):
-            numbers, times = list(rows), list(rows.values())
-            axes.plot(numbers, times, color=ink, marker="o", markersize=4, label=case)
-            if panel != "worlds" and numbers[0]:
-                linear = [times[0] * n / numbers[0] for n in numbers]
-                axes.plot(numbers, linear, ":", color="#8a8f98", label="linear")
-        if panel == "worlds":
-            axes.set(xscale="log", yscale="log")
-        else:
-            axes.set_ylim(0, None)
-        unit = "ns per env-step" if panel == "worlds" else "ns per world-step"
-        axes.set(xlabel=panel, ylabel=unit)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(alpha=0.25)
-        axes.legend(frameon=False)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(out)
-    plt.close(figure)
 
 
 if __name__ == "__main__":

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-INK, SAMPLED = "#0072B2", "#86b8d8"
-FLOOR_INKS = ("#8a8f98", "#b06a00", "#00805c")
+from marl_airhockey.charts import DPI, INK, INKS, PALE, save, tidy
 
 
 def learning_curve(
@@ -29,15 +25,15 @@ def learning_curve(
         title: of the plot.
         path: of the PNG.
     """
-    figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=130, layout="constrained")
+    figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
     cpu = [0.0, *(float(row["cpu_seconds"]) for row in rows)]
     for name, label, ink in (
         ("success", "learned, mean action", INK),
-        ("success_sampled", "learned, sampled", SAMPLED),
+        ("success_sampled", "learned, sampled", PALE),
     ):
         share = [0.0, *(float(row[name]) for row in rows)]
         axes.plot(cpu, share, color=ink, marker="o", markersize=4, label=label)
-    for (name, level), ink in zip(floors.items(), FLOOR_INKS, strict=False):
+    for (name, level), ink in zip(floors.items(), INKS, strict=False):
         axes.axhline(level, color=ink, linestyle="--", linewidth=1.2, label=name)
     axes.set(
         xlabel="CPU-seconds of training",
@@ -46,11 +42,8 @@ def learning_curve(
         xlim=(0, None),
         title=title.replace("_", " "),
     )
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(alpha=0.25)
-    axes.legend(frameon=False, loc="center right")
-    figure.savefig(path)
-    plt.close(figure)
+    tidy(axes, "center right")
+    save(figure, path)
 
 
 def seed_curves(
@@ -68,7 +61,7 @@ def seed_curves(
         down,
         across,
         figsize=(2.6 * across, 2.2 * down),
-        dpi=130,
+        dpi=DPI,
         layout="constrained",
         squeeze=False,
         sharey=True,
@@ -83,13 +76,11 @@ def seed_curves(
         cpu = np.mean(
             [[float(row["cpu_seconds"]) for row in rows[:length]] for rows in seeds], 0
         )
-        axes.fill_between(cpu, share.min(0), share.max(0), color=SAMPLED, alpha=0.6)
+        axes.fill_between(cpu, share.min(0), share.max(0), color=PALE, alpha=0.6)
         axes.plot(cpu, share.mean(0), color=INK)
-        axes.axhline(0.95, color=FLOOR_INKS[0], linestyle=":", linewidth=1)
+        axes.axhline(0.95, color=INKS[0], linestyle=":", linewidth=1)
         axes.set(title=name.replace("_", " "), ylim=(-0.03, 1.03), xlim=(0, None))
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.grid(alpha=0.25)
+        tidy(axes, legend=None)
     figure.supxlabel("CPU-seconds of training")
     figure.supylabel("success")
-    figure.savefig(path)
-    plt.close(figure)
+    save(figure, path)
