@@ -6,8 +6,10 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from marl_airhockey.cast import Cast
-from marl_airhockey.state import Array, State
+from marl_airhockey.state import Array, State, still_state
 
 TOLD_SPEED = 5.0
 """m/s: a told paddle that must be faster than this is lifted, without contact."""
@@ -28,6 +30,12 @@ class Backend(ABC):
     """Physics of B worlds with one cast.
 
     Paddles track their command and are not pushed back by a puck.
+
+    Args:
+        cast: who is on the table.
+        num_worlds: B.
+        control_dt: s of a step.
+        substeps: physics steps in it.
     """
 
     exact: ClassVar[bool]
@@ -41,6 +49,12 @@ class Backend(ABC):
     ) -> None:
         self.cast, self.num_worlds = cast, num_worlds
         self.control_dt, self.substeps = control_dt, substeps
+        self.quiet = still_state(cast.bodies, num_worlds, len(cast.mouths))
+        """All at rest. States share its arrays of what they have nothing to say about;
+        nobody writes to them."""
+        self._nobody = np.zeros((num_worlds, cast.bodies.paddles), np.bool_)
+        moments = substeps + 1 if cast.path else 0
+        self._path_shape = (num_worlds, moments, cast.bodies.movers, 4)
 
     @classmethod
     def available(cls) -> str | None:
@@ -53,16 +67,29 @@ class Backend(ABC):
         return None
 
     @abstractmethod
-    def set_physics(self, values: dict[str, Array], mask: Array) -> None:
-        """Set the parameters of the worlds of a mask (B,); values are (B,) each."""
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        """Set the parameters of some worlds, by index (W,); values are (B,) each."""
 
     @abstractmethod
-    def start(self, state: State, mask: Array) -> None:
-        """Go on from ``state`` (of all B worlds); those of a mask (B,) start anew."""
+    def start(self, state: State, worlds: Array) -> None:
+        """Go on from ``state`` (of all B worlds); some, by index (W,), start anew."""
 
     @abstractmethod
     def step(self, command: Command) -> State:
-        """Move all worlds by ``control_dt``; ``time`` counts from the last start."""
+        """Move all worlds by ``control_dt``; ``time`` counts from the last start.
+
+        The arrays of the state are its own, or those of `quiet`.
+        """
+
+    def _follow(self, command: Command, position: Array) -> tuple[Array, Array, Array]:
+        """How fast seats go (B, seats, 2), who of them is told, and who is lifted."""
+        if command.told is None:
+            return command.velocity, self._nobody, self._nobody
+        told = np.asarray(np.isfinite(command.told).all(-1))
+        way = command.told[..., :2] - position[:, : told.shape[1]]
+        way /= self.control_dt
+        lifted = told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
+        return np.where(told[..., None], way, command.velocity), told, lifted
 
     def close(self) -> None:
         """Let go of whatever the backend holds."""

@@ -62,8 +62,21 @@ class Order(NamedTuple):
     """(B, paddles) touches nothing"""
 
 
+class Last(NamedTuple):
+    """What a step begins with: not changed."""
+
+    position: Array
+    """(B, N, 2) m"""
+    velocity: Array
+    """(B, N, 2) m/s"""
+    touching: Array
+    """(B, paddles, pucks) see `State`"""
+    time: Array
+    """(B,) s"""
+
+
 class Motion(NamedTuple):
-    """Where everything is and goes: changed in place."""
+    """Where everything gets to; `push` is kept from step to step."""
 
     position: Array
     """(B, N, 2) m"""
@@ -73,10 +86,12 @@ class Motion(NamedTuple):
     """(B, substeps + 1, movers, 4) x, y, vx, vy, or (B, 0, movers, 4) if not wanted"""
     push: Array
     """(B, movers, 2) m: what the next substep takes back of overlaps"""
+    time: Array
+    """(B,) s"""
 
 
 class Events(NamedTuple):
-    """What happened to pucks, and what outlasts a step: changed in place."""
+    """What happened to pucks; the last two are kept from step to step."""
 
     touched: Array
     """(B, paddles, pucks) see `State`, as the next four"""
@@ -88,3 +103,23 @@ class Events(NamedTuple):
     """(B, pucks, M) whether a puck touches the wall that is a mouth"""
     out: Array
     """(B, pucks) whether a puck is out of play"""
+
+
+class Batch(NamedTuple):
+    """B worlds: all that the kernel works on."""
+
+    ground: Ground
+    law: Array
+    """(B, LAWS)"""
+    order: Order
+    last: Last
+    motion: Motion
+    events: Events
+
+    def rows(self, rows: slice) -> Batch:
+        """Some of the worlds."""
+        order = Order(*[array[rows] for array in self.order])
+        last = Last(*[array[rows] for array in self.last])
+        motion = Motion(*[array[rows] for array in self.motion])
+        events = Events(*[array[rows] for array in self.events])
+        return Batch(self.ground, self.law[rows], order, last, motion, events)

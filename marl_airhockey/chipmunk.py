@@ -18,6 +18,7 @@ import pymunk.batch
 from numba import njit
 from pymunk._chipmunk_cffi import ffi, lib
 
+from marl_airhockey.paddles import drive
 from marl_airhockey.state import Array
 
 EVENT, SUBSTEP = 0, 1
@@ -35,8 +36,8 @@ def _function(name: str, *arguments: Any) -> Any:
 
 
 _set_velocity = _function("cpBodySetVelocity", ctypes.c_double, ctypes.c_double)
+_set_position = _function("cpBodySetPosition", ctypes.c_double, ctypes.c_double)
 _advance = _function("cpSpaceStep", ctypes.c_double)
-
 
 _each = _function("cpSpaceEachBody", ctypes.c_void_p, ctypes.c_void_p)
 _gather = address(ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched"))
@@ -52,22 +53,27 @@ _nothing = _zero.ctypes.data
 def drift(
     worlds: Array,
     goal: Array,
+    told: Array,
     kicks: Array,
     dt: float,
     substeps: int,
+    diameter: float,
     flags: Array,
     position: Array,
     velocity: Array,
     path: Array,
 ) -> int:
-    """Step quiet worlds with one paddle each until the end or the first event.
+    """Step quiet worlds until the end or the first event.
 
     Args:
-        worlds: (B, 5) addresses: the space, its paddle's body, and its `Reader`'s.
-        goal: (B, 1, 2) paddle velocity at the end, m/s; the ramp to it is linear.
+        worlds: (B, 4 + paddles) addresses: the space, its `Reader`'s three, the
+            paddles' bodies.
+        goal: (B, paddles, 2) velocity at the end, m/s; the ramp to it is linear.
+        told: (B, paddles) moves at its goal all along and does not yield.
         kicks: (B, N) what a body's vx is ahead of what Chipmunk says, m/s.
         dt: of a substep, s.
         substeps: physics steps in the control step.
+        diameter: of a paddle, m.
         flags: (B, 2) EVENT, set by callbacks, and SUBSTEP. A world whose EVENT is set
             before is left alone, with SUBSTEP -1.
         position: (B, N, 2) m, of the movers changed in place.
@@ -76,22 +82,27 @@ def drift(
             (without kicks), or (B, 0, movers, 4).
 
     Returns:
-        The number of worlds that Python must go on with; of these, position and
-        velocity are as they were.
+        The number of worlds that Python must go on with; of these, the paddles are
+        where and as fast as they have become, the rest is as it was.
     """
-    every, left = path.shape[1] > 0, 0
-    rows = np.empty(path.shape[2:])
+    every, left, paddles = path.shape[1] > 0, 0, goal.shape[1]
+    rows, mean = np.empty(path.shape[2:]), np.empty((paddles, 2))
     for b in range(len(worlds)):
         flags[b, SUBSTEP] = -1
         if not flags[b, EVENT]:
-            vx, vy = velocity[b, 0, 0], velocity[b, 0, 1]
-            rx, ry = (goal[b, 0, 0] - vx) / substeps, (goal[b, 0, 1] - vy) / substeps
+            hands, speeds = position[b, :paddles], velocity[b, :paddles]
             if every:
                 _record(worlds[b], path[b, 0])
             for k in range(substeps):
                 flags[b, SUBSTEP] = k
-                share = k + 0.5
-                _set_velocity(worlds[b, 1], vx + share * rx, vy + share * ry)
+                rest = substeps - k
+                met = drive(hands, speeds, goal[b], told[b], rest, dt, diameter, mean)
+                for i in range(paddles):
+                    body, vx, vy = worlds[b, 4 + i], mean[i, 0], mean[i, 1]
+                    _set_velocity(body, vx, vy)
+                    if met:
+                        x, y = hands[i, 0] - vx * dt, hands[i, 1] - vy * dt
+                        _set_position(body, x, y)
                 _advance(worlds[b, 0], dt)
                 if flags[b, EVENT]:
                     break
@@ -103,16 +114,17 @@ def drift(
         _record(worlds[b], rows)
         for i in range(len(rows)):
             position[b, i, 0], position[b, i, 1] = rows[i, 0], rows[i, 1]
-            velocity[b, i, 0], velocity[b, i, 1] = rows[i, 2] + kicks[b, i], rows[i, 3]
-        velocity[b, 0, 0], velocity[b, 0, 1] = goal[b, 0, 0], goal[b, 0, 1]
+            if i >= paddles:
+                velocity[b, i, 0] = rows[i, 2] + kicks[b, i]
+                velocity[b, i, 1] = rows[i, 3]
     return left
 
 
 @njit(cache=False)
 def _record(world: Array, rows: Array) -> None:
-    _copy(world[3], _nothing, 4)
-    _each(world[0], _gather, world[2])
-    _copy(rows.ctypes.data, world[4], rows.size * 8)
+    _copy(world[2], _nothing, 4)
+    _each(world[0], _gather, world[1])
+    _copy(rows.ctypes.data, world[3], rows.size * 8)
 
 
 class Reader:

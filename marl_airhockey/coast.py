@@ -12,73 +12,91 @@ from marl_airhockey.batch import (
     COAST_WAY,
     FALL,
     GRIP,
-    Events,
-    Ground,
-    Motion,
-    Order,
+    Batch,
 )
 from marl_airhockey.discs import meet_obstacle
 from marl_airhockey.state import Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def find_busy(
-    ground: Ground,
-    law: Array,
-    order: Order,
-    motion: Motion,
-    events: Events,
-    busy: Array,
-) -> None:
+def begin(batch: Batch) -> None:
+    """Everything as it was at the end of the last step, and nothing has happened."""
+    last, motion, events = batch.last, batch.motion, batch.events
+    motion.position[:] = last.position
+    motion.velocity[:] = last.velocity
+    motion.time[:] = last.time + batch.ground.control_dt
+    events.touched[:], events.touched_at[:] = 0, np.nan
+    events.touching[:] = last.touching
+    events.crossed[:], events.crossed_velocity[:] = False, 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def find_busy(batch: Batch, busy: Array) -> None:
     """In which worlds bodies may meet anything within the step.
 
-    A body stays within a disc about its place, of the way that it can go at most.
+    A ramp is a parabola, which lies between its control points; drag keeps a puck on
+    the way of free flight. So a body comes no nearer to a thing than the best of these
+    points, seen along the line to it at the beginning, and the way of its fall.
     """
+    ground, law, order, _, motion, events = batch
     paddles, pucks, blocks, radius, lines, _, obstacles, control_dt, n = ground
-    position, velocity, _, push = motion
+    position, velocity, _, push, _ = motion
     goal, out = order.goal, events.out
     first, movers = paddles + pucks, paddles + pucks + blocks
-    way = np.zeros(movers)
+    # Where the control points of each body lie, from its place.
+    early, late = np.zeros((movers, 2)), np.zeros((movers, 2))
     for b in range(len(law)):
-        met, fall = False, law[b, FALL] * n
+        met, drop = False, law[b, FALL] * n * control_dt
         for i in range(movers):
             vx, vy = velocity[b, i, 0], velocity[b, i, 1]
-            most, extra = vx * vx + vy * vy, 0.0
             if i < paddles:
                 gx, gy = goal[b, i, 0], goal[b, i, 1]
-                most = max(most, gx * gx + gy * gy)
+                if order.told[b, i]:
+                    vx, vy = gx, gy
+                early[i, 0], early[i, 1] = 0.5 * vx * control_dt, 0.5 * vy * control_dt
+                late[i, 0] = 0.5 * (vx + gx) * control_dt
+                late[i, 1] = 0.5 * (vy + gy) * control_dt
             elif i < first:
-                # A puck out of play meets nothing.
-                extra = -np.inf if out[b, i - paddles] else fall
+                early[i, 0], early[i, 1] = vx * control_dt, vy * control_dt
+                late[i, 0], late[i, 1] = early[i, 0], early[i, 1]
             else:
-                met |= most > 0.0 or law[b, FALL] > law[b, GRIP]
+                met |= vx != 0.0 or vy != 0.0 or law[b, FALL] > law[b, GRIP]
                 met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
-            way[i] = radius[i] + (np.sqrt(most) + extra) * control_dt
         for i in range(paddles, first):
-            x, y = position[b, i, 0], position[b, i, 1]
+            # A puck out of play meets nothing.
+            if out[b, i - paddles]:
+                continue
+            x, y, size = position[b, i, 0], position[b, i, 1], radius[i] + drop
             for s in range(len(lines)):
-                met |= lines[s, 0] * x + lines[s, 1] * y + lines[s, 2] < way[i]
-            for o in range(len(obstacles)):
-                met |= meet_obstacle(x, y, way[i], obstacles, o)[0] > 0.0
+                nx, ny = lines[s, 0], lines[s, 1]
+                nearing = max(-(nx * late[i, 0] + ny * late[i, 1]), 0.0)
+                met |= nx * x + ny * y + lines[s, 2] < size + nearing
+            if len(obstacles) > 0:
+                way = np.sqrt(late[i, 0] ** 2 + late[i, 1] ** 2)
+                for o in range(len(obstacles)):
+                    met |= meet_obstacle(x, y, size + way, obstacles, o)[0] > 0.0
         for i in range(first):
+            if i >= paddles and out[b, i - paddles]:
+                continue
             for j in range(i + 1, movers):
+                if paddles <= j < first and out[b, j - paddles]:
+                    continue
                 dx = position[b, j, 0] - position[b, i, 0]
                 dy = position[b, j, 1] - position[b, i, 1]
-                reach = max(way[i] + way[j], 0.0)
-                met |= dx * dx + dy * dy < reach * reach
+                gap = dx * dx + dy * dy
+                mine = max(dx * early[i, 0] + dy * early[i, 1], 0.0)
+                mine = max(mine, dx * late[i, 0] + dy * late[i, 1])
+                other = max(-(dx * early[j, 0] + dy * early[j, 1]), 0.0)
+                other = max(other, -(dx * late[j, 0] + dy * late[j, 1]))
+                reach, left = radius[i] + radius[j] + drop, gap - mine - other
+                met |= left <= 0.0 or left * left < reach * reach * gap
         busy[b] = met
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def coast(
-    ground: Ground,
-    law: Array,
-    order: Order,
-    motion: Motion,
-    events: Events,
-    busy: Array,
-) -> None:
+def coast(batch: Batch, busy: Array) -> None:
     """The others in closed form: paddles on their ramps, pucks in free flight."""
+    ground, law, order, _, motion, events = batch
     paddles, pucks, _, _, _, mouths, _, control_dt, _ = ground
     position, velocity, goal = motion.position, motion.velocity, order.goal
     touching, leaning, out = events.touching, events.leaning, events.out

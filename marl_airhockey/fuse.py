@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.loops import Writer, load
+from marl_airhockey.pool import Pool
 from marl_airhockey.state import Array
-from marl_airhockey.symbols import Symbol, Tape
+from marl_airhockey.symbols import Tape
 from marl_airhockey.threads import over_rows, spreads
 
 Source = Mapping[str, Any]
@@ -25,10 +26,6 @@ Sink = dict[str, Array]
 """Named arrays (B, *)."""
 Function = Callable[..., tuple[Sink, ...]]
 """Takes sources and gives sinks, leading axes being the caller's."""
-
-POOL = 64
-"""Rows of every output that are made at once: numpy hands out rows of an array faster
-than new arrays."""
 
 
 class Fused:
@@ -46,7 +43,7 @@ class Fused:
         """Why it runs as plain numpy, if it does."""
 
     def __call__(self, *sources: Source) -> tuple[Sink, ...]:
-        """The sinks, for all worlds of the sources."""
+        """The sinks, for all worlds of the sources, in arrays that nobody else has."""
         if self._plan is not None:
             try:
                 return self._plan(sources)
@@ -54,17 +51,18 @@ class Fused:
                 self._plan = None
                 self._refuse(error)
         plain = self._function(*sources)
-        if self.refused is not None:
-            return plain
-        try:
-            plan = _Plan(self._function, sources, plain)
-            done = plan(sources)
-            _compare(done, plain)
-        except Exception as error:
-            self._refuse(error)
-            return plain
-        self._plan = plan
-        return done
+        if self.refused is None:
+            try:
+                plan = _Plan(self._function, sources, plain)
+                done = plan(sources)
+                _compare(done, plain)
+            except Exception as error:
+                self._refuse(error)
+            else:
+                self._plan = plan
+                return done
+        # Copies, as numpy may have handed on what it was given.
+        return tuple({k: np.array(v) for k, v in sink.items()} for sink in plain)
 
     def _refuse(self, error: Exception) -> None:
         self.refused = f"{type(error).__name__}: {error}"
@@ -93,7 +91,7 @@ class _Plan:
                     row[key] = tape.array((i, key), value[0])
             symbolic.append(row)
         writer = Writer(tape, {name: a.dtype for name, a in arrays.items()})
-        self._blank: list[tuple[tuple[int, ...], Any]] = []
+        kinds: list[tuple[tuple[int, ...], Any]] = []
         for sink, real in zip(function(*symbolic), plain, strict=True):
             writer.begin_sink()
             for key, out in sink.items():
@@ -101,17 +99,13 @@ class _Plan:
                 shape, dtype = real[key].shape[1:], real[key].dtype
                 if place.shape != shape:
                     raise ValueError(f"{key} has shape {place.shape} in a single world")
-                name = _as_it_was(place)
-                if name is not None and arrays[name].shape[1:] == shape:
-                    writer.keep(key, name)
-                else:
-                    writer.store(key, place, dtype)
-                    self._blank.append((shape, dtype))
+                writer.store(key, place, dtype)
+                kinds.append((shape, dtype))
         self._count = next(iter(arrays))
         self._kernel, self._call = load(writer.source(len(sources)))
         self._kinds = [arrays[name].dtype for name in writer.inputs]
-        self._kinds += [dtype for _, dtype in self._blank]
-        self._pools: dict[int, list[tuple[Array, ...]]] = {}
+        self._kinds += [dtype for _, dtype in kinds]
+        self._pool = Pool(kinds)
         self._copied = False
         """Whether some array is not as at the first call (rows one behind the other,
         the same type) and must be copied."""
@@ -119,7 +113,7 @@ class _Plan:
     def __call__(self, sources: tuple[Source, ...]) -> tuple[Sink, ...]:
         """Call the loop."""
         i, key = self._count
-        outputs = self._outputs(len(sources[i][key]))
+        outputs = self._pool.take(len(sources[i][key]))
         if self._copied:
             return self._call(self._copying, outputs, *sources)
         try:
@@ -140,31 +134,6 @@ class _Plan:
             self._kernel(*[array[rows] for array in arrays])
 
         over_rows(work, len(arrays[0]))
-
-    def _outputs(self, worlds: int) -> tuple[Array, ...]:
-        """Fresh output arrays; for few worlds many calls' worth are made at once."""
-        if worlds >= POOL:
-            return tuple(np.empty((worlds, *s), kind) for s, kind in self._blank)
-        pool = self._pools.setdefault(worlds, [])
-        if not pool:
-            calls = POOL // worlds
-            blocks = [np.empty((calls, worlds, *s), kind) for s, kind in self._blank]
-            pool += zip(*blocks, strict=True)
-        return pool.pop()
-
-
-def _as_it_was(place: Array) -> tuple[int, str] | None:
-    """The name of the input that an output is, unchanged."""
-    names: set[tuple[int, str]] = set()
-    for index in np.ndindex(place.shape):
-        symbol = place[index]
-        if not isinstance(symbol, Symbol) or symbol.op != "input":
-            return None
-        name, where = symbol.args
-        if where != index:
-            return None
-        names.add(name)
-    return names.pop() if len(names) == 1 else None
 
 
 def _compare(done: tuple[Sink, ...], plain: tuple[Sink, ...]) -> None:

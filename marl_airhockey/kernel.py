@@ -19,12 +19,14 @@ from marl_airhockey.batch import (
     PADDLE,
     PUCK_MASS,
     WALL,
+    Batch,
     Events,
     Ground,
+    Last,
     Motion,
     Order,
 )
-from marl_airhockey.coast import coast, find_busy
+from marl_airhockey.coast import begin, coast, find_busy
 from marl_airhockey.discs import (
     SLOP,
     bounce,
@@ -42,12 +44,11 @@ from marl_airhockey.rails import SQUEEZE, slip, wall
 from marl_airhockey.state import Array
 
 
-def advance(
-    ground: Ground, law: Array, order: Order, motion: Motion, events: Events
-) -> None:
-    """Move B worlds by a control step, in place; ``law`` is (B, LAWS)."""
+def advance(batch: Batch) -> None:
+    """Move B worlds by a control step, in place."""
     # Unpacked on the way in: numba is slow to take tuples of arrays from Python.
-    _advance(*ground, law, *order, *motion, *events)
+    ground, law, order, last, motion, events = batch
+    _advance(*ground, law, *order, *last, *motion, *events)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -65,10 +66,15 @@ def _advance(
     goal: Array,
     told: Array,
     lifted: Array,
+    last_position: Array,
+    last_velocity: Array,
+    last_touching: Array,
+    last_time: Array,
     position: Array,
     velocity: Array,
     path: Array,
     push: Array,
+    time: Array,
     touched: Array,
     touched_at: Array,
     touching: Array,
@@ -81,34 +87,31 @@ def _advance(
         paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, substeps
     )
     order = Order(goal, told, lifted)
-    motion = Motion(position, velocity, path, push)
+    last = Last(last_position, last_velocity, last_touching, last_time)
+    motion = Motion(position, velocity, path, push, time)
     events = Events(
         touched, touched_at, touching, crossed, crossed_velocity, leaning, out
     )
+    batch = Batch(ground, law, order, last, motion, events)
+    begin(batch)
     busy = np.ones(len(law), np.bool_)
     if motion.path.shape[1] == 0:
-        find_busy(ground, law, order, motion, events, busy)
-        coast(ground, law, order, motion, events, busy)
-    _substeps(ground, law, order, motion, events, busy)
+        find_busy(batch, busy)
+        coast(batch, busy)
+    _substeps(batch, busy)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _substeps(
-    ground: Ground,
-    law: Array,
-    order: Order,
-    motion: Motion,
-    events: Events,
-    busy: Array,
-) -> None:
+def _substeps(batch: Batch, busy: Array) -> None:
     """The busy worlds, substep by substep.
 
     The inner functions are one phase of a substep each; numba puts them in place, which
     spares it counting references to a dozen arrays at every call.
     """
+    ground, law, order, _, motion, events = batch
     paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, n = ground
     goal, told, lifted = order
-    position, velocity, path, pending = motion
+    position, velocity, path, pending, _ = motion
     touched, touched_at, touching, crossed, crossed_velocity, leaning, out = events
     first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
     # Of one world: places, velocities, those before this substep's forces, ways that
@@ -119,17 +122,15 @@ def _substeps(
     weight, spring = np.zeros(movers), np.ones(movers)
     away, awake = np.zeros(movers, np.bool_), np.zeros(movers, np.bool_)
     # What can meet in what is left of the step: bodies and fixed things, bodies and
-    # bodies. Listed anew after every contact, which may make something faster.
+    # bodies, and whether any paddles can. Listed anew after every contact, which may
+    # make something faster.
     hard = np.zeros((movers * (len(lines) + len(obstacles)), 2), np.int64)
     soft = np.zeros((movers * movers, 2), np.int64)
     reach = np.zeros(movers)
-    hards, softs, fresh = (
-        np.zeros(1, np.int64),
-        np.zeros(1, np.int64),
-        np.zeros(1, np.bool_),
-    )
+    hards, softs = np.zeros(1, np.int64), np.zeros(1, np.int64)
+    fresh, crowd = np.zeros(1, np.bool_), np.zeros(1, np.bool_)
 
-    def begin(b: int, kick: float) -> None:
+    def enter(b: int, kick: float) -> None:
         for i in range(movers):
             for axis in range(2):
                 p[i, axis], v[i, axis] = position[b, i, axis], velocity[b, i, axis]
@@ -158,9 +159,12 @@ def _substeps(
             awake[i] = i < first or most > 0.0 or shift > 0.0
             awake[i] |= law[b, FALL] > law[b, GRIP]
         hards[0] = softs[0] = 0
-        fresh[0] = True
+        fresh[0], crowd[0] = True, False
         for i in range(movers):
             x, y = p[i, 0], p[i, 1]
+            for j in range(i + 1, paddles):
+                dx, dy, most = p[j, 0] - x, p[j, 1] - y, reach[i] + reach[j]
+                crowd[0] |= dx * dx + dy * dy < most * most
             for c in range(len(lines) + len(obstacles)):
                 if i < paddles or away[i] or not awake[i]:
                     continue
@@ -188,7 +192,7 @@ def _substeps(
                 v[i, axis] = ramped[i, axis] + 0.5 * ramp
                 p[i, axis] += v[i, axis] * dt
                 ramped[i, axis] += ramp
-        if paddles > 1 and meet(p, ramped, told[b], 2 * radius[0]):
+        if crowd[0] and meet(p, ramped, told[b], 2 * radius[0]):
             fresh[0] = False
             for i in range(paddles):
                 v[i, 0], v[i, 1] = ramped[i, 0], ramped[i, 1]
@@ -331,7 +335,7 @@ def _substeps(
         if not busy[b]:
             continue
         kick = 0.5 * law[b, FALL]
-        begin(b, kick)
+        enter(b, kick)
         list_near(b, n)
         if path.shape[1] > 0:
             record(b, 0, kick)

@@ -32,6 +32,8 @@ class Reach:
     share: Array
     """(S,) of the acceleration that may be planned against one edge, so that braking
     against both edges of a corner together stays within it"""
+    turn: Array
+    """(S, 2, 2) from the table frame to each seat's ego frame"""
     passes: int
     """Rounds of projection: more than one if any corner is sharper than 90 degrees"""
 
@@ -45,7 +47,9 @@ class Reach:
             cosine = np.einsum("kd,kd->k", normal, np.roll(normal, -1, axis=0)).min()
             share[s] = np.sqrt((1 + cosine) / 2)
             sharpest = min(sharpest, cosine)
-        return Reach(normals, offsets, share, passes=1 if sharpest > -1e-9 else 12)
+        turn = np.array([table.rotation(seat.side) for seat in seats])
+        passes = 1 if sharpest > -1e-9 else 12
+        return Reach(normals, offsets, share, turn, passes)
 
 
 class Sent(NamedTuple):
@@ -75,10 +79,10 @@ def limits(
     acceleration: Array,
     dt: float,
 ) -> Sent:
-    """What is sent for what is asked, in the table frame.
+    """What is sent for what is asked; all but that in the table frame.
 
     Args:
-        asked: (B, S, 2) wanted velocity as a fraction of top speed.
+        asked: (B, S, 2) wanted velocity as a fraction of top speed, ego frames.
         position: (B, N, 2) of all bodies, paddles first, m.
         velocity: (B, N, 2) of all bodies, m/s; a paddle's is what was sent last.
         pushed: (B, S, 2) acceleration of the last step, m/s2.
@@ -100,6 +104,7 @@ def limits(
         reach.normals,
         reach.offsets,
         reach.share,
+        reach.turn,
         reach.passes,
         speed,
         acceleration,
@@ -122,6 +127,7 @@ def _filter(
     normals: Array,
     offsets: Array,
     share: Array,
+    turn: Array,
     passes: int,
     speed: Array,
     acceleration: Array,
@@ -132,15 +138,16 @@ def _filter(
 ) -> bool:
     """`limits` for each seat of each world; False if an asked one is not finite."""
     edges, rate = normals.shape[1], 1.0 / dt
-    fastest = np.empty(edges)
+    # The edges that are close, and how fast a paddle may go toward each.
+    close, fastest = np.empty(edges, np.int64), np.empty(edges)
 
     # Functions in place: calls with arrays would cost more than the arithmetic.
-    def inside(s: int, x: float, y: float) -> tuple[float, float]:
+    def inside(s: int, count: int, x: float, y: float) -> tuple[float, float]:
         """A velocity with what goes too fast toward an edge taken off."""
         for _ in range(passes):
-            for k in range(edges):
-                nx, ny = normals[s, k, 0], normals[s, k, 1]
-                over = -(nx * x + ny * y) - fastest[k]
+            for i in range(count):
+                nx, ny = normals[s, close[i], 0], normals[s, close[i], 1]
+                over = -(nx * x + ny * y) - fastest[i]
                 if over > 0.0:
                     x, y = x + over * nx, y + over * ny
         return x, y
@@ -148,12 +155,16 @@ def _filter(
     for b in range(asked.shape[0]):
         top, most = speed[b], acceleration[b] * dt
         for s in range(asked.shape[1]):
-            ax, ay = top * asked[b, s, 0], top * asked[b, s, 1]
+            ahead, aside = top * asked[b, s, 0], top * asked[b, s, 1]
+            ax = turn[s, 0, 0] * ahead + turn[s, 1, 0] * aside
+            ay = turn[s, 0, 1] * ahead + turn[s, 1, 1] * aside
             vx, vy = velocity[b, s, 0], velocity[b, s, 1]
-            norm = np.sqrt(ax * ax + ay * ay)
-            if not np.isfinite(norm):
-                return False
-            fit = top / max(norm, top)
+            square, norm, fit = ax * ax + ay * ay, top, 1.0
+            if not square <= top * top:
+                norm = np.sqrt(square)
+                if not np.isfinite(norm):
+                    return False
+                fit = top / norm
             dx, dy = ax * fit - vx, ay * fit - vy
             change = np.sqrt(dx * dx + dy * dy)
             fit = most / max(change, most)
@@ -163,23 +174,24 @@ def _filter(
             # This step takes (v + h) dt / 2; the stop h^2 / 2a and, in ramped steps,
             # up to h dt / 2 more. It never needs more than the planned deceleration.
             planned = acceleration[b] * share[s]
-            ample = top * (0.5 * top / planned + dt)
-            px, py, close = position[b, s, 0], position[b, s, 1], False
+            inverse = 1.0 / planned
+            ample = top * (0.5 * top * inverse + dt)
+            px, py, count = position[b, s, 0], position[b, s, 1], 0
             for k in range(edges):
                 nx, ny = normals[s, k, 0], normals[s, k, 1]
                 closing = -(nx * vx + ny * vy)
                 room = nx * px + ny * py + offsets[s, k] - 0.5 * dt * closing
                 if room >= ample:
-                    fastest[k] = np.inf
                     continue
-                close = True
-                h = planned * (np.sqrt(dt * dt + 2.0 * max(room, 0.0) / planned) - dt)
-                fastest[k] = max(h, closing - planned * dt)
-            sx, sy = inside(s, wx, wy) if close else (wx, wy)
-            if close and (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
+                stop = np.sqrt(dt * dt + 2.0 * max(room, 0.0) * inverse)
+                h = planned * (stop - dt)
+                close[count], fastest[count] = k, max(h, closing - planned * dt)
+                count += 1
+            sx, sy = inside(s, count, wx, wy)
+            if count and (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
                 # Toward pure braking until the change is allowed. Both ends of the way
                 # lie inside the (convex) bounds of the edges, so all of it does.
-                bx, by = inside(s, vx, vy)
+                bx, by = inside(s, count, vx, vy)
                 share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
                 sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
             sent[b, s, 0], sent[b, s, 1] = sx, sy

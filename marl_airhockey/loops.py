@@ -67,10 +67,6 @@ class Writer:
         """What follows goes into the next mapping."""
         self._sinks.append([])
 
-    def keep(self, key: str, name: Name) -> None:
-        """Hand an input on as it is."""
-        self._sinks[-1].append(f"{key!r}: {_lookup(name)}")
-
     def store(self, key: str, place: Array, dtype: Any) -> None:
         """Write an array of one world, (*) scalars, to a fresh output."""
         variable = f"o{len(self._outputs)}"

@@ -1,4 +1,4 @@
-"""How two paddles meet: one law for every 2D backend."""
+"""How paddles move and meet: one law for every 2D backend."""
 
 from __future__ import annotations
 
@@ -6,6 +6,43 @@ import numpy as np
 from numba import njit
 
 from marl_airhockey.state import Array
+
+
+@njit(cache=True)
+def drive(
+    position: Array,
+    velocity: Array,
+    goal: Array,
+    told: Array,
+    left: int,
+    dt: float,
+    diameter: float,
+    mean: Array,
+) -> bool:
+    """Move paddles by a substep of their linear ramps, in place; True if any met.
+
+    Args:
+        position: (paddles, 2) m.
+        velocity: (paddles, 2) m/s.
+        goal: (paddles, 2) m/s after the ``left`` substeps to come.
+        told: (paddles,) bool: moves at its goal all along and does not yield.
+        left: substeps in what is left of the ramp.
+        dt: of a substep, s.
+        diameter: distance of two centres in contact, m.
+        mean: (paddles, 2) m/s, filled with how fast each goes within the substep.
+    """
+    for i in range(len(position)):
+        for axis in range(2):
+            if told[i]:
+                velocity[i, axis] = goal[i, axis]
+            ramp = (goal[i, axis] - velocity[i, axis]) / left
+            mean[i, axis] = velocity[i, axis] + 0.5 * ramp
+            position[i, axis] += mean[i, axis] * dt
+            velocity[i, axis] += ramp
+    met = meet(position, velocity, told, diameter)
+    if met:
+        mean[:] = velocity
+    return met
 
 
 @njit(cache=True)

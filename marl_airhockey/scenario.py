@@ -129,7 +129,7 @@ class Scenario(ABC):
     ) -> tuple[Array, State, Memory] | None:
         """Serve again inside an episode, for games that go on after a goal.
 
-        Returns None, or a mask (W,) and rows for the worlds of the mask.
+        Returns None, or some of the worlds, by index (W,), and rows for them.
         """
         return None
 

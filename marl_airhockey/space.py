@@ -12,7 +12,7 @@ from pymunk._chipmunk_cffi import lib
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.chipmunk import EVENT, SUBSTEP, Reader, address
-from marl_airhockey.paddles import meet
+from marl_airhockey.paddles import drive
 from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.rails import SQUEEZE, sides, slip, wall
 from marl_airhockey.state import Array
@@ -64,6 +64,8 @@ class Space:
         self._read = Reader(space, len(self.bodies))
         self._space = space._space
         self._raw = [body._body for body in self.bodies]
+        self._hands = self._raw[bodies.paddle]
+        self._mean = np.zeros((bodies.paddles, 2))
         self._loose = [s._shape for body in self.bodies for s in body.shapes]
         self.set_physics({name: p.default for name, p in PARAMETERS.items()})
 
@@ -251,35 +253,32 @@ class Space:
         """Move by ``control_dt``, or by what `chipmunk.drift` has left of it.
 
         Args:
-            position: (paddles, 2) now, m; changed in place.
-            velocity: (paddles, 2) now, m/s; changed in place.
+            position: (paddles, 2) by now, m; changed in place.
+            velocity: (paddles, 2) by now, m/s; changed in place.
             goal: (paddles, 2) velocity at the end of the step, m/s.
             told: (paddles,) bool: moves at ``goal`` all the time and does not yield.
             path: (substeps + 1, movers, 4) to be filled, or None.
         """
         n, flags, first = self.substeps, self.flags, int(self.flags[SUBSTEP]) + 1
-        set_velocity, advance = lib.cpBodySetVelocity, lib.cpSpaceStep
-        velocity[told] = goal[told]
-        ramp = (goal - velocity) / n
-        alone = len(position) == 1
-        (rx, ry), (x, y) = ramp[0].tolist(), (velocity[0] + 0.5 * ramp[0]).tolist()
+        dt, size, mean = self.sim_dt, 2 * self.cast.table.paddle_radius, self._mean
         if first:
             self._settle()
         if path is not None:
             path[first] = self.read()
         for k in range(first, n):
             flags[SUBSTEP] = k
-            if alone:
-                set_velocity(self._raw[0], (x + k * rx, y + k * ry))
-            else:
-                self._drive(position, velocity, ramp, told)
-            advance(self._space, self.sim_dt)
+            met = drive(position, velocity, goal, told, n - k, dt, size, mean)
+            for body, speed in zip(self._hands, mean.tolist(), strict=True):
+                lib.cpBodySetVelocity(body, speed)
+            if met:
+                back = position - mean * dt
+                for body, place in zip(self._hands, back.tolist(), strict=True):
+                    lib.cpBodySetPosition(body, place)
+            lib.cpSpaceStep(self._space, dt)
             if flags[EVENT]:
                 self._settle()
             if path is not None:
                 path[k + 1] = self.read()
-        if alone:
-            velocity[0] = goal[0]
 
     def begin(self) -> None:
         """Forget the events of the last step."""
@@ -289,21 +288,6 @@ class Space:
         for k in self._out:
             self._park(k)
         self.flags[EVENT] = bool(self._out) or bool(self.touching.any())
-
-    def _drive(
-        self, position: Array, velocity: Array, ramp: Array, told: Array
-    ) -> None:
-        """Move several paddles by a substep, letting them meet."""
-        mean = velocity + 0.5 * ramp
-        position += mean * self.sim_dt
-        velocity += ramp
-        met = meet(position, velocity, told, 2 * self.cast.table.paddle_radius)
-        for i, body in enumerate(self._raw[: len(position)]):
-            speed = velocity[i] if met else mean[i]
-            lib.cpBodySetVelocity(body, tuple(speed.tolist()))
-            if met:
-                back = position[i] - speed * self.sim_dt
-                lib.cpBodySetPosition(body, tuple(back.tolist()))
 
     def _settle(self) -> None:
         """After a contact: no puck in a wall, above the cap, or in a mouth in play."""
@@ -340,8 +324,9 @@ class Space:
 
     @property
     def addresses(self) -> tuple[int, ...]:
-        """What `chipmunk.drift` needs: the space, the first paddle, the reader."""
-        return address(self._space), address(self._raw[0]), *self._read.addresses
+        """What `chipmunk.drift` needs: the space, its reader, the paddles."""
+        hands = [address(body) for body in self._hands]
+        return address(self._space), *self._read.addresses, *hands
 
     @property
     def out(self) -> dict[int, tuple[float, float]]:

@@ -158,18 +158,31 @@ class State:
         new.__dict__["time"], new.__dict__["path"] = time, path
         return new
 
-    def scatter(self, worlds: Array, rows: State) -> State:
-        """A copy in which some worlds (W,), by index, hold ``rows``, in order."""
-        arrays: dict[str, Any] = {}
-        for name in (*ARRAYS, *(("path",) if self.path is not None else ())):
-            arrays[name] = getattr(self, name).copy()
-            arrays[name][worlds] = getattr(rows, name)
-        return replace(self, **arrays)
+    def write(self, worlds: Array, rows: State, shared: State) -> State:
+        """The state with ``rows`` in some worlds (W,), by index, and no path.
+
+        Its own arrays are changed in place; one that it shares with ``shared`` is
+        copied first, if it has to change.
+        """
+        new = self.moved(self.position, self.velocity, self.time, None)
+        for name in ARRAYS:
+            array, value = getattr(self, name), getattr(rows, name)
+            if array is getattr(shared, name):
+                if np.array_equal(array[worlds], value):
+                    continue
+                array = array.copy()
+                vars(new)[name] = array
+            array[worlds] = value
+        return new
 
 
 ARRAYS = tuple(
     f.name for f in fields(State) if f.name not in ("bodies", "path", "extra")
 )
+
+
+EVENTS = ("touched", "touched_at", "touching", "crossed", "crossed_velocity")
+"""The arrays that tell what happened in a step."""
 
 
 def still_state(bodies: Bodies, worlds: int, mouths: int) -> State:

@@ -6,7 +6,6 @@ Everything above (PettingZoo, Gymnasium, vector environments) is a thin view of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -58,9 +57,7 @@ class World:
         seats = range(len(cast.seats))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = Reach.of(cast.table, cast.seats)
-        self._to_ego = np.array([cast.table.rotation(s.side) for s in cast.seats])
-        self._straight = bool((self._to_ego == np.eye(2)).all())
-        self.referee = Referee(scenario, self._to_ego)
+        self.referee = Referee(scenario, self.reach.turn)
         self.sensor = Sensor(cast, b, physics, dt)
         self.observer = Observer(scenario, self.sensor, physics, observe)
         self.driven = [
@@ -129,13 +126,12 @@ class World:
             stream.renew(worlds, self._seeds, episode.number, purpose)
         if not episode.physics:
             episode.physics = self.physics.draw(self._streams["physics"])
-            everywhere = np.ones(self.num_worlds, np.bool_)
-            self.backend.set_physics(episode.physics, everywhere)
+            self.backend.set_physics(episode.physics, np.arange(self.num_worlds))
         elif self.physics.varies:
             drawn = self.physics.draw(self._streams["physics"].select(worlds))
             for name, value in drawn.items():
                 episode.physics[name][worlds] = value
-            self.backend.set_physics(episode.physics, self._mask(worlds))
+            self.backend.set_physics(episode.physics, worlds)
         draws = self._streams["start"].select(worlds)
         self._place(worlds, *self.scenario.start(draws, len(worlds)))
         for name in ("cycles", "returns", "success", "first_shot"):
@@ -148,20 +144,15 @@ class World:
         for seat in self.driven:
             seat.start(worlds, self._seeds, episode.number)
 
-    def _mask(self, worlds: Array) -> Array:
-        mask = np.zeros(self.num_worlds, np.bool_)
-        mask[worlds] = True
-        return mask
-
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put some worlds into rows of a state and a memory."""
         if len(worlds) == self.num_worlds:
             self.state, self.memory = rows, memory
         else:
-            self.state = replace(self.state, path=None).scatter(worlds, rows)
-            old = self.memory
-            self.memory = {k: _merged(old[k], worlds, row) for k, row in memory.items()}
-        self.backend.start(self.state, self._mask(worlds))
+            self.state = self.state.write(worlds, rows, self.backend.quiet)
+            for name, row in memory.items():
+                self.memory[name][worlds] = row
+        self.backend.start(self.state, worlds)
 
     def _look(self, starting: Array | None = None) -> State:
         """Sense the state, beginning anew in some worlds, by index."""
@@ -189,10 +180,6 @@ class World:
         if self._delay is not None:
             asked = self._delay.push(asked, values["action_delay"])
         self.asked = asked
-        if not self._straight:
-            c, s = self._to_ego[:, 0, 0], self._to_ego[:, 0, 1]
-            ahead, aside = asked[..., 0], asked[..., 1]
-            asked = np.stack([c * ahead - s * aside, s * ahead + c * aside], -1)
         sent, self._pushed, excess = limits(
             asked,
             before.position,
@@ -236,7 +223,7 @@ class World:
                 continue
             if told is None:
                 told = np.full((*asked.shape[:2], 4), np.nan)
-            turn = self._to_ego[seat.index]
+            turn = self.reach.turn[seat.index]
             told[:, seat.index, :2] = place[:, :2] @ turn
             told[:, seat.index, 2:] = place[:, 2:] @ turn
         return asked, told
@@ -266,18 +253,19 @@ class World:
         """Serve again inside episodes, sense, and restart the worlds that ended."""
         self._sensed = self._look()
         served = self.scenario.restart(self._streams["serve"], self.state, self.memory)
+        done = result.terminated | result.truncated
         if served is not None:
-            mask, rows, memory = served
-            done = result.terminated | result.truncated
-            live = ~done[mask]
-            worlds = np.flatnonzero(mask & ~done)
-            rows = rows.map(lambda x: x[live])
-            self._place(worlds, rows, {k: v[live] for k, v in memory.items()})
+            worlds, rows, memory = served
+            live = ~done[worlds]
+            if not live.all():
+                worlds, rows = worlds[live], rows.map(lambda x: x[live])
+                memory = {k: v[live] for k, v in memory.items()}
+            self._place(worlds, rows, memory)
             self._sensed = self._look(worlds)
         result.observation = self.observation()
         if not self.autoreset:
             return
-        worlds = np.flatnonzero(result.terminated | result.truncated)
+        worlds = np.flatnonzero(done)
         if len(worlds):
             result.final_observation = result.observation
             self.restart(worlds)

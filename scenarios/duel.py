@@ -96,13 +96,13 @@ class Duel(Scenario):
     def restart(
         self, draws: Draws, after: State, memory: Memory
     ) -> tuple[Array, State, Memory] | None:
-        mask = memory["serve"] != 0.0
-        if not mask.any():
+        worlds = np.flatnonzero(memory["serve"])
+        if not len(worlds):
             return None
-        rows = after.map(lambda x: x[mask])
-        starts.serve(draws.select(mask), rows, 2, memory["serve"][mask])
-        kept = {name: value[mask] for name, value in memory.items()}
-        return mask, rows, {**kept, "serve": np.zeros(len(rows.time))}
+        rows = after.map(lambda x: x[worlds])
+        starts.serve(draws.select(worlds), rows, 2, memory["serve"][worlds])
+        kept = {name: value[worlds] for name, value in memory.items()}
+        return worlds, rows, {**kept, "serve": np.zeros(len(worlds))}
 
     def success(self, after: State, memory: Memory) -> Array:
         goals = memory["goals"]

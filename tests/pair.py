@@ -47,15 +47,15 @@ class Pair(Scenario):
         return {"goal": scored - scored[..., ::-1]}
 
     def restart(self, draws, after, memory):
-        mask = after.crossed[..., 0, :].any(-1)
-        if not mask.any():
+        worlds = np.flatnonzero(after.crossed[..., 0, :].any(-1))
+        if not len(worlds):
             return None
-        state = self.serve(draws.select(mask), int(mask.sum()))
-        state.time[:] = after.time[mask]
+        state = self.serve(draws.select(worlds), len(worlds))
+        state.time[:] = after.time[worlds]
         # Paddles play on where they are.
-        state.paddle[:] = after.paddle[mask]
-        state.paddle_velocity[:] = after.paddle_velocity[mask]
-        return mask, state, {k: v[mask] for k, v in memory.items()}
+        state.paddle[:] = after.paddle[worlds]
+        state.paddle_velocity[:] = after.paddle_velocity[worlds]
+        return worlds, state, {k: v[worlds] for k, v in memory.items()}
 
     def success(self, after, memory):
         return memory["goals"] >= 3

@@ -30,7 +30,7 @@ class Bench:
         values = {name: p.default for name, p in PARAMETERS.items()}
         values.update({"tilt": 0.0, "puck_damping": 0.0}, **(physics or {}))
         rows = {name: np.full(1, value) for name, value in values.items()}
-        self.backend.set_physics(rows, np.ones(1, bool))
+        self.backend.set_physics(rows, np.arange(1))
 
     def start(self, paddle, *others):
         """Place the paddle at (x, y) and the others at (x, y, vx, vy)."""
@@ -38,7 +38,7 @@ class Bench:
         state.position[0, 0] = paddle
         for i, (x, y, vx, vy) in enumerate(others, start=1):
             state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
-        self.backend.start(state, np.ones(1, bool))
+        self.backend.start(state, np.arange(1))
         return state
 
     def run(self, seconds, velocity=(0.0, 0.0)):
@@ -295,7 +295,7 @@ def test_two_paddles_meet_and_share_their_normal_speed(backend):
     table = kind(cast, 1, DT, kind.default_substeps)
     state = first_state(cast, 1)
     state.position[0] = [(-0.5, 0.0), (-0.3, 0.0)]
-    table.start(state, np.ones(1, bool))
+    table.start(state, np.arange(1))
     pushing = Command(np.array([[[1.0, 0.3], [-0.4, 0.0]]]))
     for _ in range(12):
         state = table.step(pushing)
@@ -332,7 +332,7 @@ def test_pucks_stay_on_a_regular_polygon(backend, sides):
         state.position[0, k] = middle @ table.rotation(seat.side)
     state.velocity[0, sides:] = [(2.0, 0.7), (-1.1, 1.9)]
     state.position[0, sides:] = [(0.05, 0.0), (-0.05, 0.0)]
-    world.start(state, np.ones(1, bool))
+    world.start(state, np.arange(1))
     for _ in range(200):
         state = world.step(Command(np.zeros((1, sides, 2))))
         depth = state.puck[0] @ table.normals.T + table.offsets

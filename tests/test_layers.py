@@ -12,7 +12,7 @@ LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
-    | {"symbols", "loops", "fuse", "threads"},
+    | {"symbols", "pool", "loops", "fuse", "threads"},
     {
         "backends",
         "chipmunk",
@@ -27,7 +27,7 @@ LAYERS = (
     {"sensor", "observer", "seats", "canvas", "pixels", "render", "window"}
     | {"episode", "referee", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
-    {"match", "bench", "film", "catalogue", "learn", "cli"},
+    {"charts", "match", "bench", "film", "catalogue", "learn", "cli"},
 )
 PURE = sorted(LAYERS[0] | LAYERS[1])
 EXTRAS = [

@@ -25,12 +25,12 @@ def play(cast, rows, seconds, command=None, **physics):
     for name in ("pymunk", "batched"):
         backend = find_backend(name)(cast, worlds, DT, 10)
         arrays = {k: np.full(worlds, v) for k, v in values.items()}
-        backend.set_physics(arrays, np.ones(worlds, bool))
+        backend.set_physics(arrays, np.arange(worlds))
         state = first_state(cast, worlds)
         movers = cast.bodies.movers
         state.position[:, :movers] = rows[..., :2]
         state.velocity[:, :movers] = rows[..., 2:]
-        backend.start(state, np.ones(worlds, bool))
+        backend.start(state, np.arange(worlds))
         sent = np.zeros((worlds, cast.bodies.paddles, 2))
         sent = sent if command is None else command
         found[name] = [backend.step(Command(sent)) for _ in range(round(seconds / DT))]

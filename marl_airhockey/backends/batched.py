@@ -6,17 +6,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from marl_airhockey.backend import TOLD_SPEED, Backend, Command
-from marl_airhockey.batch import LAWS, Events, Ground, Motion, Order, laws
+from marl_airhockey.backend import Backend, Command
+from marl_airhockey.batch import LAWS, Batch, Events, Ground, Last, Motion, Order, laws
 from marl_airhockey.cast import Cast
 from marl_airhockey.kernel import advance
+from marl_airhockey.pool import Pool
 from marl_airhockey.rails import sides
-from marl_airhockey.state import Array, State, still_state
+from marl_airhockey.state import EVENTS, Array, State
 from marl_airhockey.table import GRAVITY
 from marl_airhockey.threads import over_rows, spreads
 
-KEPT = ("position", "velocity", "touching", "time")
-"""The arrays of a state that the next step needs."""
+RESULTS = ("position", "velocity", "time", *EVENTS)
+"""The arrays of a state that a step makes."""
 
 
 class Batched(Backend):
@@ -44,14 +45,12 @@ class Batched(Backend):
             substeps,
         )
         self._laws = np.zeros((num_worlds, LAWS))
-        self._quiet = still_state(bodies, num_worlds, len(mouths))
-        self._rows = {name: getattr(self._quiet, name) for name in KEPT}
+        self._last = self._rows(self.quiet)
+        results = [getattr(self.quiet, name) for name in RESULTS]
+        self._pool = Pool([(array.shape[1:], array.dtype) for array in results])
         self._leaning = np.zeros((num_worlds, bodies.pucks, len(mouths)), np.bool_)
         self._out = np.zeros((num_worlds, bodies.pucks), np.bool_)
         self._push = np.zeros((num_worlds, bodies.movers, 2))
-        self._never = np.zeros((num_worlds, bodies.paddles), np.bool_)
-        moments = substeps + 1 if cast.path else 0
-        self._moments = (num_worlds, moments, bodies.movers, 4)
 
     @classmethod
     def supports(cls, cast: Cast) -> str | None:
@@ -61,63 +60,41 @@ class Batched(Backend):
             return "blocks could slide into a goal mouth; leave out one or the other"
         return None
 
-    def set_physics(self, values: dict[str, Array], mask: Array) -> None:
-        rows = {name: value[mask] for name, value in values.items()}
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        rows = {name: value[worlds] for name, value in values.items()}
         rows["pull"] = GRAVITY * np.sin(np.radians(rows["tilt"]))
-        self._laws[mask] = laws(rows, self.control_dt, self.substeps)
+        self._laws[worlds] = laws(rows, self.control_dt, self.substeps)
 
-    def start(self, state: State, mask: Array) -> None:
-        self._rows = {name: getattr(state, name) for name in KEPT}
-        self._leaning[mask] = False
-        self._out[mask] = False
-        self._push[mask] = 0.0
+    def start(self, state: State, worlds: Array) -> None:
+        self._last = self._rows(state)
+        self._leaning[worlds] = False
+        self._out[worlds] = False
+        self._push[worlds] = 0.0
+
+    @staticmethod
+    def _rows(state: State) -> Last:
+        return Last(state.position, state.velocity, state.touching, state.time)
 
     def step(self, command: Command) -> State:
-        old, quiet = self._rows, self._quiet
-        goal, told, lifted = command.velocity, self._never, self._never
-        if command.told is not None:
-            told = np.asarray(np.isfinite(command.told).all(-1))
-            way = command.told[..., :2] - old["position"][:, : told.shape[1]]
-            way /= self.control_dt
-            goal = np.where(told[..., None], way, goal)
-            lifted = told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
-        position, velocity = old["position"].copy(), old["velocity"].copy()
-        path = np.empty(self._moments)
-        events = Events(
-            quiet.touched.copy(),
-            quiet.touched_at.copy(),
-            old["touching"].copy(),
-            quiet.crossed.copy(),
-            quiet.crossed_velocity.copy(),
-            self._leaning,
-            self._out,
-        )
-        order = Order(goal, told, lifted)
-        motion = Motion(position, velocity, path, self._push)
-
-        def work(rows: slice) -> None:
-            some = Order(*[array[rows] for array in order])
-            moved = Motion(*[array[rows] for array in motion])
-            happened = Events(*[array[rows] for array in events])
-            advance(self._ground, self._laws[rows], some, moved, happened)
-
+        last = self._last
+        position, velocity, time, *happened = self._pool.take(self.num_worlds)
+        path = np.empty(self._path_shape)
+        order = Order(*self._follow(command, last.position))
+        motion = Motion(position, velocity, path, self._push, time)
+        events = Events(*(*happened, self._leaning, self._out))
+        batch = Batch(self._ground, self._laws, order, last, motion, events)
         if spreads(self.num_worlds):
-            over_rows(work, self.num_worlds)
+            over_rows(lambda rows: advance(batch.rows(rows)), self.num_worlds)
         else:
-            advance(self._ground, self._laws, order, motion, events)
+            advance(batch)
         if command.told is not None:
+            told = order.told
             velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
-        time = old["time"] + self.control_dt
-        new = quiet.moved(position, velocity, time, path if self.cast.path else None)
-        for name in (
-            "touched",
-            "touched_at",
-            "touching",
-            "crossed",
-            "crossed_velocity",
-        ):
-            vars(new)[name] = getattr(events, name)
-        self._rows = {name: getattr(new, name) for name in KEPT}
+        self._last = Last(position, velocity, events.touching, time)
+        new = self.quiet.moved(
+            position, velocity, time, path if self.cast.path else None
+        )
+        vars(new).update(zip(EVENTS, happened, strict=True))
         return new
 
 

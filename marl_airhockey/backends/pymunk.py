@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from marl_airhockey.backend import TOLD_SPEED, Backend, Command
+from marl_airhockey.backend import Backend, Command
 from marl_airhockey.cast import Cast
 from marl_airhockey.chipmunk import AVAILABLE, EVENT, SUBSTEP, drift, new_flags
 from marl_airhockey.space import Space
-from marl_airhockey.state import Array, State, still_state
+from marl_airhockey.state import EVENTS, Array, State
 
 
 class Pymunk(Backend):
@@ -27,15 +27,10 @@ class Pymunk(Backend):
         self._flags = new_flags(num_worlds)
         self.spaces = [Space(cast, control_dt, substeps, row) for row in self._flags]
         self._worlds = np.array([s.addresses for s in self.spaces], np.int64)
-        self._drifts = AVAILABLE and len(cast.seats) == 1
-        self.state = still_state(cast.bodies, num_worlds, len(cast.mouths))
-        self._quiet = self.state
+        self.state = self.quiet
         self._kicks = np.zeros((num_worlds, len(cast.bodies)))
-        self._never = np.zeros((num_worlds, len(cast.seats)), np.bool_)
         self._eventful: list[int] = []
         """Worlds in which something touched or crossed at the end of the last step."""
-        moments = substeps + 1 if cast.path else 0
-        self._moments = (num_worlds, moments, cast.bodies.movers, 4)
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
 
     @classmethod
@@ -44,54 +39,65 @@ class Pymunk(Backend):
             return "blocks could slide into a goal mouth; leave out one or the other"
         return None
 
-    def set_physics(self, values: dict[str, Array], mask: Array) -> None:
-        for i in np.flatnonzero(mask):
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        for i in worlds.tolist():
             row = {name: float(value[i]) for name, value in values.items()}
             self.spaces[i].set_physics(row)
             self._kicks[i, self.cast.bodies.puck] = self.spaces[i].kick
 
-    def start(self, state: State, mask: Array) -> None:
-        self.state, worlds = state, np.flatnonzero(mask)
-        for i in worlds:
+    def start(self, state: State, worlds: Array) -> None:
+        self.state, rows = state, worlds.tolist()
+        for i in rows:
             self.spaces[i].start(state.position[i], state.velocity[i], state.angle[i])
-        self._eventful = sorted({*self._eventful, *worlds.tolist()})
+        self._eventful = sorted({*self._eventful, *rows})
 
     def step(self, command: Command) -> State:
-        old, goal, told, lifted = self.state, command.velocity, self._never, None
+        old = self.state
         position, velocity = old.position.copy(), old.velocity.copy()
-        path = np.empty(self._moments)
+        path = np.empty(self._path_shape)
+        goal, told, lifted = self._follow(command, position)
         if command.told is not None:
-            goal, told, lifted = self._follow(position, command.told, goal)
+            self._lift(lifted, True)
         for i in self._eventful:
             self.spaces[i].begin()
-        for i in self._drift(goal, lifted is not None, position, velocity, path):
+        for i in self._drift(goal, told, position, velocity, path):
             self._finish(i, goal[i], told[i], position[i], velocity[i], path[i])
         time = old.time + self.control_dt
         if self.cast.path:
             path[..., 2] += self._kicks[:, None, : path.shape[2]]
-        new = self._quiet.moved(
+        new = self.quiet.moved(
             position, velocity, time, path if self.cast.path else None
         )
         if self._eventful:
             new = self._with_events(new, self._eventful)
         if command.told is not None:
-            self._land(new, command.told, lifted)
+            new.velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
+            self._lift(lifted, False)
         if self._turns:
             new = self._with_turns(new)
         self.state = new
         return new
 
     def _drift(
-        self, goal: Array, any_told: bool, position: Array, velocity: Array, path: Array
+        self, goal: Array, told: Array, position: Array, velocity: Array, path: Array
     ) -> list[int]:
         """Step the quiet worlds in compiled code; those that Python must finish."""
         flags, self._eventful = self._flags, []
-        if not self._drifts or any_told:
+        if not AVAILABLE:
             flags[:, SUBSTEP] = -1
             return list(range(self.num_worlds))
-        dt, n = self.control_dt / self.substeps, self.substeps
         left = drift(
-            self._worlds, goal, self._kicks, dt, n, flags, position, velocity, path
+            self._worlds,
+            goal,
+            told,
+            self._kicks,
+            self.control_dt / self.substeps,
+            self.substeps,
+            2 * self.cast.table.paddle_radius,
+            flags,
+            position,
+            velocity,
+            path,
         )
         return flags[:, EVENT].nonzero()[0].tolist() if left else []
 
@@ -106,8 +112,9 @@ class Pymunk(Backend):
     ) -> None:
         """Step a world to the end of the control step, in place."""
         space, seats = self.spaces[i], len(goal)
-        paddles, speeds = position[:seats].copy(), velocity[:seats].copy()
-        space.step(paddles, speeds, goal, told, path if self.cast.path else None)
+        speeds = velocity[:seats].copy()
+        path_or_none = path if self.cast.path else None
+        space.step(position[:seats], speeds, goal, told, path_or_none)
         rows = space.read()
         position[: len(rows)], velocity[: len(rows)] = rows[:, :2], rows[:, 2:]
         velocity[: len(rows), 0] += self._kicks[i, : len(rows)]
@@ -117,8 +124,7 @@ class Pymunk(Backend):
 
     def _with_events(self, state: State, worlds: list[int]) -> State:
         """The state with the contacts and crossings of some worlds."""
-        names = ("touched", "touched_at", "touching", "crossed", "crossed_velocity")
-        arrays = {name: getattr(self._quiet, name).copy() for name in names}
+        arrays = {name: getattr(self.quiet, name).copy() for name in EVENTS}
         puck = self.cast.bodies.puck.start
         for i in worlds:
             space = self.spaces[i]
@@ -129,24 +135,9 @@ class Pymunk(Backend):
                 state.velocity[i, puck + k] = 0.0
         return replace(state, **arrays)
 
-    def _follow(
-        self, position: Array, told: Array, goal: Array
-    ) -> tuple[Array, Array, Array]:
-        """Velocities, who is told and who is lifted, for a command with told seats."""
-        is_told = np.asarray(np.isfinite(told).all(-1))
-        way = told[..., :2] - position[:, : told.shape[1]]
-        way /= self.control_dt
-        lifted = is_told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
+    def _lift(self, lifted: Array, up: bool) -> None:
         for i, k in zip(*np.nonzero(lifted), strict=True):
-            self.spaces[i].lift(int(k), True)
-        return np.where(is_told[..., None], way, goal), is_told, lifted
-
-    def _land(self, new: State, told: Array, lifted: Array | None) -> None:
-        is_told = np.isfinite(told).all(-1)
-        new.velocity[:, : told.shape[1]][is_told] = told[is_told][:, 2:]
-        assert lifted is not None
-        for i, k in zip(*np.nonzero(lifted), strict=True):
-            self.spaces[i].lift(int(k), False)
+            self.spaces[i].lift(int(k), up)
 
     def _with_turns(self, state: State) -> State:
         angle, spin = np.zeros((2, *state.time.shape, len(state.bodies)))

@@ -123,9 +123,10 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     for name in changes or {}:
         if name not in known:
             raise ValueError(unknown("setting", name, known))
-    merged = {**presets["defaults"], **presets.get(scenario, {}), **(changes or {})}
-    if merged.get("profile") == "robot":
-        merged.setdefault("observe", "history")
+    merged = {**presets["defaults"], **presets.get(scenario, {})}
+    robot = {"observe": "history", **merged.pop("robot", {})}
+    merged |= robot if (changes or {}).get("profile") == "robot" else {}
+    merged |= changes or {}
     return TrainConfig(**{**merged, "scenario": scenario})
 
 

@@ -1,0 +1,37 @@
+"""Fresh arrays for the results of a call, made many calls' worth at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.state import Array
+
+ROWS = 64
+"""Rows of every array that are made at once: numpy hands out rows of an array faster
+than new arrays."""
+
+
+class Pool:
+    """Hands out arrays that nobody else has, of any content.
+
+    Args:
+        kinds: shape and type of a row of each array.
+    """
+
+    def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]]) -> None:
+        self._kinds = list(kinds)
+        self._waiting: dict[int, list[tuple[Array, ...]]] = {}
+
+    def take(self, rows: int) -> tuple[Array, ...]:
+        """One array of each kind, with so many rows."""
+        if rows >= ROWS or not self._kinds:
+            return tuple(np.empty((rows, *shape), kind) for shape, kind in self._kinds)
+        waiting = self._waiting.setdefault(rows, [])
+        if not waiting:
+            calls = ROWS // max(rows, 1)
+            blocks = [np.empty((calls, rows, *s), kind) for s, kind in self._kinds]
+            waiting += zip(*blocks, strict=True)
+        return waiting.pop()
