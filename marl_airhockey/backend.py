@@ -24,6 +24,8 @@ class Command:
     told: Array | None = None
     """(B, seats, 4) position and velocity at the end of the step, nan where a seat
     asks; None if all do"""
+    shut: Array | None = None
+    """(B, mouths) goal mouths that are wall in this step; None if none is"""
 
 
 class Backend(ABC):
@@ -53,6 +55,7 @@ class Backend(ABC):
         """All at rest. States share its arrays of what they have nothing to say about;
         nobody writes to them."""
         self._nobody = np.zeros((num_worlds, cast.bodies.paddles), np.bool_)
+        self._open = np.zeros((num_worlds, len(cast.mouths)), np.bool_)
         moments = substeps + 1 if cast.path else 0
         self._path_shape = (num_worlds, moments, cast.bodies.movers, 4)
 

@@ -60,6 +60,8 @@ class Order(NamedTuple):
     """(B, paddles) moves at its velocity and does not yield"""
     lifted: Array
     """(B, paddles) touches nothing"""
+    shut: Array
+    """(B, M) mouths that are wall"""
 
 
 class Last(NamedTuple):

@@ -54,6 +54,7 @@ def drift(
     worlds: Array,
     goal: Array,
     told: Array,
+    lifted: Array,
     kicks: Array,
     dt: float,
     substeps: int,
@@ -70,6 +71,7 @@ def drift(
             paddles' bodies.
         goal: (B, paddles, 2) velocity at the end, m/s; the ramp to it is linear.
         told: (B, paddles) moves at its goal all along and does not yield.
+        lifted: (B, paddles) touches nothing.
         kicks: (B, N) what a body's vx is ahead of what Chipmunk says, m/s.
         dt: of a substep, s.
         substeps: physics steps in the control step.
@@ -96,7 +98,17 @@ def drift(
             for k in range(substeps):
                 flags[b, SUBSTEP] = k
                 rest = substeps - k
-                met = drive(hands, speeds, goal[b], told[b], rest, dt, diameter, mean)
+                met = drive(
+                    hands,
+                    speeds,
+                    goal[b],
+                    told[b],
+                    lifted[b],
+                    rest,
+                    dt,
+                    diameter,
+                    mean,
+                )
                 for i in range(paddles):
                     body, vx, vy = worlds[b, 4 + i], mean[i, 0], mean[i, 1]
                     _set_velocity(body, vx, vy)

@@ -66,6 +66,7 @@ def _advance(
     goal: Array,
     told: Array,
     lifted: Array,
+    shut: Array,
     last_position: Array,
     last_velocity: Array,
     last_touching: Array,
@@ -86,7 +87,7 @@ def _advance(
     ground = Ground(
         paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, substeps
     )
-    order = Order(goal, told, lifted)
+    order = Order(goal, told, lifted, shut)
     last = Last(last_position, last_velocity, last_touching, last_time)
     motion = Motion(position, velocity, path, push, time)
     events = Events(
@@ -109,8 +110,9 @@ def _substeps(batch: Batch, busy: Array) -> None:
     spares it counting references to a dozen arrays at every call.
     """
     ground, law, order, _, motion, events = batch
-    paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, n = ground
-    goal, told, lifted = order
+    paddles, pucks, blocks, radius, shared, mouths, obstacles, control_dt, n = ground
+    lines = shared.copy()
+    goal, told, lifted, shut = order
     position, velocity, path, pending, _ = motion
     touched, touched_at, touching, crossed, crossed_velocity, leaning, out = events
     first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
@@ -131,6 +133,9 @@ def _substeps(batch: Batch, busy: Array) -> None:
     fresh, crowd = np.zeros(1, np.bool_), np.zeros(1, np.bool_)
 
     def enter(b: int, kick: float) -> None:
+        for m in range(len(mouths)):
+            side = mouths[m, 0]
+            lines[side, 5] = 0.0 if shut[b, m] else shared[side, 5]
         for i in range(movers):
             for axis in range(2):
                 p[i, axis], v[i, axis] = position[b, i, axis], velocity[b, i, axis]
@@ -192,7 +197,7 @@ def _substeps(batch: Batch, busy: Array) -> None:
                 v[i, axis] = ramped[i, axis] + 0.5 * ramp
                 p[i, axis] += v[i, axis] * dt
                 ramped[i, axis] += ramp
-        if crowd[0] and meet(p, ramped, told[b], 2 * radius[0]):
+        if crowd[0] and meet(p, ramped, told[b], lifted[b], 2 * radius[0]):
             fresh[0] = False
             for i in range(paddles):
                 v[i, 0], v[i, 1] = ramped[i, 0], ramped[i, 1]

@@ -14,6 +14,7 @@ def drive(
     velocity: Array,
     goal: Array,
     told: Array,
+    lifted: Array,
     left: int,
     dt: float,
     diameter: float,
@@ -26,6 +27,7 @@ def drive(
         velocity: (paddles, 2) m/s.
         goal: (paddles, 2) m/s after the ``left`` substeps to come.
         told: (paddles,) bool: moves at its goal all along and does not yield.
+        lifted: (paddles,) bool: touches nothing.
         left: substeps in what is left of the ramp.
         dt: of a substep, s.
         diameter: distance of two centres in contact, m.
@@ -39,14 +41,16 @@ def drive(
             mean[i, axis] = velocity[i, axis] + 0.5 * ramp
             position[i, axis] += mean[i, axis] * dt
             velocity[i, axis] += ramp
-    met = meet(position, velocity, told, diameter)
+    met = meet(position, velocity, told, lifted, diameter)
     if met:
         mean[:] = velocity
     return met
 
 
 @njit(cache=True)
-def meet(position: Array, velocity: Array, told: Array, diameter: float) -> bool:
+def meet(
+    position: Array, velocity: Array, told: Array, lifted: Array, diameter: float
+) -> bool:
     """Separate overlapping paddles in place; True if any pair overlapped.
 
     Each goes back by half of the overlap and both take the mean of their normal
@@ -57,6 +61,7 @@ def meet(position: Array, velocity: Array, told: Array, diameter: float) -> bool
         position: (paddles, 2) m, changed in place.
         velocity: (paddles, 2) m/s, changed in place.
         told: (paddles,) bool.
+        lifted: (paddles,) bool: touches nothing.
         diameter: distance of two centres in contact, m.
     """
     met = False
@@ -66,6 +71,8 @@ def meet(position: Array, velocity: Array, told: Array, diameter: float) -> bool
             ny = position[j, 1] - position[i, 1]
             distance = np.sqrt(nx * nx + ny * ny)
             if distance >= diameter or (told[i] and told[j]):
+                continue
+            if lifted[i] or lifted[j]:
                 continue
             met = True
             if distance > 1e-9:

@@ -97,6 +97,15 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             teams.setdefault(seat.team, []).append(f"paddle_{i}")
         return teams
 
+    @property
+    def group_map(self) -> dict[str, list[str]]:
+        """Open agents by team, as TorchRL's ``group_map`` and RLlib's policies ask."""
+        names = {f"team_{team}": agents for team, agents in self.teams.items()}
+        mine = {
+            k: [a for a in v if a in self.possible_agents] for k, v in names.items()
+        }
+        return {name: agents for name, agents in mine.items() if agents}
+
     def observation_space(self, agent: str) -> Any:
         """The same object at every call."""
         return self._observation_spaces[agent]

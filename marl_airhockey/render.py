@@ -55,12 +55,14 @@ class Scene:
     clock: float = 0.0
     """Share of the episode that is over."""
     success: bool = False
+    retired: Sequence[bool] = ()
+    """Which seats are out of the game, if any are."""
 
 
 def draw(scene: Scene, width: int = 880) -> Array:
     """A picture (H, W, 3) uint8 RGB of a scene, ``width`` pixels wide."""
     canvas = Canvas(scene.cast.table, width, margin=0.075, bar=44)
-    _table(canvas, scene.cast)
+    _table(canvas, scene)
     for mark in scene.marks:
         _mark(canvas, mark)
     for trail in scene.trails:
@@ -74,8 +76,9 @@ def draw(scene: Scene, width: int = 880) -> Array:
     return canvas.picture()
 
 
-def _table(canvas: Canvas, cast: Cast) -> None:
-    table, corners = cast.table, np.asarray(cast.table.vertices)
+def _table(canvas: Canvas, scene: Scene) -> None:
+    cast, table = scene.cast, scene.cast.table
+    corners, sides = np.asarray(table.vertices), [seat.side for seat in cast.seats]
     grown = corners * (1 + 0.04 / table.offsets.min())
     box = np.abs(corners) + 0.04
     if len(corners) == 4:
@@ -84,25 +87,25 @@ def _table(canvas: Canvas, cast: Cast) -> None:
     canvas.polygon(corners, FIELD)
     half = table.size[1] / 2
     canvas.ring((0, 0), 0.16, FAINT, 2)
-    if len(corners) == 4:
+    if len(corners) == 4 and len(set(sides)) <= 2:
         canvas.line((0, -half), (0, half), PRINT, 2)
         for x in (-table.size[0] / 4, table.size[0] / 4):
             canvas.line((x, -half), (x, half), FAINT, 1)
     canvas.disc((0, 0), 0.012, PRINT)
     for i, seat in enumerate(cast.seats):
         reach = np.asarray(seat.reach) @ table.rotation(seat.side)
-        canvas.polygon(reach, _pale(_seat_colour(i), 0.86), 1)
+        canvas.polygon(reach, _pale(_seat_colour(cast, i), 0.86), 1)
     for mouth in cast.mouths:
-        if mouth.width is None:
+        owner = sides.index(mouth.side) if mouth.side in sides else 0
+        if mouth.width is None or (any(scene.retired) and scene.retired[owner]):
             continue
         start, end = table.ends(mouth.side)
         along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
         middle, out = (start + end) / 2, -0.04 * table.normals[mouth.side]
-        owner = next((i for i, s in enumerate(cast.seats) if s.side == mouth.side), 0)
         gap = np.array(
             [middle - along, middle + along, middle + along + out, middle - along + out]
         )
-        canvas.polygon(gap, _pale(_seat_colour(owner), 0.55))
+        canvas.polygon(gap, _pale(_seat_colour(cast, owner), 0.55))
 
 
 def _mark(canvas: Canvas, mark: Mark) -> None:
@@ -148,7 +151,7 @@ def _bodies(canvas: Canvas, cast: Cast, state: State) -> None:
             canvas.polygon(corners, BLOCK)
             canvas.polygon(corners, BLOCK_RIM, thin)
     for k in range(bodies.paddles):
-        colour = _seat_colour(k)
+        colour = _seat_colour(cast, k)
         canvas.disc(place[k], radius[k], colour)
         canvas.ring(place[k], radius[k] * 0.97, _dark(colour), thin)
         canvas.disc(place[k], radius[k] * 0.52, _pale(colour, 0.25))
@@ -168,11 +171,17 @@ def _bar(canvas: Canvas, scene: Scene) -> None:
     done = round(width * min(max(scene.clock, 0.0), 1.0))
     strip = slice(canvas.bar - 3 * SMOOTH, canvas.bar)
     canvas.image[strip] = FAINT
-    canvas.image[strip, :done] = _seat_colour(0)
+    canvas.image[strip, :done] = SEAT_COLOURS[0]
 
 
-def _seat_colour(seat: int) -> Colour:
-    return SEAT_COLOURS[seat % len(SEAT_COLOURS)]
+def _seat_colour(cast: Cast, seat: int) -> Colour:
+    """Each seat has its own, unless teams play: mates share one, the second paler."""
+    teams = [s.team for s in cast.seats]
+    if len(set(teams)) in (1, len(teams)):
+        return SEAT_COLOURS[seat % len(SEAT_COLOURS)]
+    mates = [i for i, team in enumerate(teams) if team == teams[seat]]
+    colour = SEAT_COLOURS[teams[seat] % len(SEAT_COLOURS)]
+    return _pale(colour, 0.4 * mates.index(seat) / (len(mates) - 1))
 
 
 def _pale(colour: Colour, share: float) -> Colour:
@@ -224,13 +233,10 @@ class Renderer:
         world, i = self.world, self.index
         state = world.state.map(lambda x: x[i])
         memory = {name: value[i] for name, value in world.memory.items()}
-        episode = world.episode
-        note = f"{float(state.time):4.1f} s   return {episode.returns[i, 0]:+.2f}"
-        if "goals" in memory:
-            score = " : ".join(f"{goals:.0f}" for goals in memory["goals"])
-            note = f"goals {score}   {float(state.time):4.1f} s"
-        elif "touches" in memory:
-            note = f"touches {int(memory['touches'].sum())}   {note}"
+        episode, retired = world.episode, world.scenario.retired(memory)
+        note = f"{world.scenario.caption(memory)}   {float(state.time):4.1f} s"
+        if len(world.cast.seats) == 1:
+            note += f"   return {episode.returns[i, 0]:+.2f}"
         return Scene(
             cast=world.cast,
             state=state,
@@ -240,6 +246,7 @@ class Renderer:
             note=note,
             clock=episode.cycles[i] / world.max_cycles,
             success=bool(episode.success[i].any()),
+            retired=() if retired is None else retired.tolist(),
         )
 
     def show(self) -> Array | None:

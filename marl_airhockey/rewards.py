@@ -13,6 +13,8 @@ from marl_airhockey.table import reaches
 
 TOUCH_GAP = 0.15
 """s: a touch is distinct if it begins this long after the last contact ended."""
+SLOW = 0.05
+"""m/s: a slower puck lies."""
 
 
 def length(vector: Array) -> Array:
@@ -82,6 +84,45 @@ def gained(old: Array, new: Array) -> Array:
     """What a best distance shrank by; nothing as long as there was none (infinite)."""
     none = np.isinf(old)
     return np.where(none, 0.0, np.where(none, 0.0, old) - np.where(none, 0.0, new))
+
+
+def last_toucher(who: Array, after: State) -> Array:
+    """(..., pucks) number of the seat that touched each puck last; ``who`` if none did.
+
+    Numbers count from 1, 0 being nobody.
+    """
+    at = np.where(after.touched > 0, after.touched_at, -1.0)
+    at = np.where(after.touching, np.inf, at)
+    latest = np.zeros_like(after.puck[..., 0])
+    for seat in range(after.bodies.paddles):
+        later = at[..., seat, :] > latest
+        who = np.where(later, 1.0 + seat, who)
+        latest = np.where(later, at[..., seat, :], latest)
+    return who
+
+
+def held(cast: Cast, old: Array, before: State, after: State) -> Array:
+    """(..., seats, pucks) s that a puck has been in reach of a seat or of a mate's."""
+    dt = (after.time - before.time)[..., None, None]
+    has = in_reach(cast, after.puck)
+    teams = np.array([seat.team for seat in cast.seats])
+    rows = [has[..., teams == seat.team].any(-1) for seat in cast.seats]
+    ours = np.stack(rows, axis=-2)
+    return np.where(ours, old + dt, 0.0)
+
+
+def lying(old: Array, clocks: Array, before: State, after: State) -> Array:
+    """(..., pucks) s that a puck has lain, slower than 0.05 m/s, out of every reach.
+
+    Args:
+        old: before the step.
+        clocks: what `held` gave after it.
+        before: the step.
+        after: the step.
+    """
+    dt = (after.time - before.time)[..., None]
+    lies = (length(after.puck_velocity) < SLOW) & ~(clocks > 0.0).any(-2)
+    return np.where(lies, old + dt, 0.0)
 
 
 def in_reach(cast: Cast, point: Array) -> Array:

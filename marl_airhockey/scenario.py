@@ -133,6 +133,13 @@ class Scenario(ABC):
         """
         return None
 
+    def retired(self, memory: Memory) -> Array | None:
+        """(..., seats) bool: who is out of the game; None where nobody ever is.
+
+        Their paddles stand behind their sides, whose goal mouths are wall.
+        """
+        return None
+
     @abstractmethod
     def success(self, after: State, memory: Memory) -> Array:
         """(...) or (..., seats) bool: what a paper reports; latched per episode."""
@@ -140,6 +147,11 @@ class Scenario(ABC):
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         """What to draw for one world, leading axes gone."""
         return []
+
+    def caption(self, memory: Memory) -> str:
+        """The score of one world in a few words."""
+        touches = memory.get("touches")
+        return "" if touches is None else f"touches {int(touches.sum())}"
 
     # What follows is shared by all scenarios and not meant to be replaced.
 

@@ -22,6 +22,8 @@ PADDLE, PUCK, WALL, MOUTH, BLOCK = 1, 2, 3, 4, 5
 """Collision types."""
 THICK = 0.5
 """m: a wall this thick is never passed between two substeps."""
+NOTHING, EVERYTHING = pymunk.ShapeFilter(mask=0), pymunk.ShapeFilter()
+"""What a shape can touch."""
 POCKET = 100.0
 """m: pucks out of play wait here, far from everything."""
 
@@ -113,6 +115,7 @@ class Space:
         """Boxes behind every side, with a gap and a sensor in it for a goal mouth."""
         cast, static = self.cast, self.space.static_body
         self.walls: list[pymunk.Shape] = []
+        self._plugs: dict[int, pymunk.Shape] = {}
         for side in range(len(cast.table.vertices)):
             start, end = cast.table.ends(side)
             along = (end - start) / np.linalg.norm(end - start)
@@ -130,6 +133,11 @@ class Space:
                 sensor.sensor, sensor.collision_type = True, MOUTH
                 self._shapes[sensor] = cast.mouths.index(mouth)
                 self.space.add(sensor)
+                plug = self._box(static, middle - half, middle + half, out)
+                plug.collision_type, plug.filter = WALL, NOTHING
+                self._plugs[cast.mouths.index(mouth)] = plug
+                self.walls.append(plug)
+                self.space.add(plug)
             cuts.append(end + along * THICK)
             for a, b in zip(cuts[::2], cuts[1::2], strict=True):
                 wall = self._box(static, a, b, out)
@@ -248,6 +256,7 @@ class Space:
         velocity: Array,
         goal: Array,
         told: Array,
+        lifted: Array,
         path: Array | None,
     ) -> None:
         """Move by ``control_dt``, or by what `chipmunk.drift` has left of it.
@@ -257,6 +266,7 @@ class Space:
             velocity: (paddles, 2) by now, m/s; changed in place.
             goal: (paddles, 2) velocity at the end of the step, m/s.
             told: (paddles,) bool: moves at ``goal`` all the time and does not yield.
+            lifted: (paddles,) bool: touches nothing.
             path: (substeps + 1, movers, 4) to be filled, or None.
         """
         n, flags, first = self.substeps, self.flags, int(self.flags[SUBSTEP]) + 1
@@ -267,7 +277,7 @@ class Space:
             path[first] = self.read()
         for k in range(first, n):
             flags[SUBSTEP] = k
-            met = drive(position, velocity, goal, told, n - k, dt, size, mean)
+            met = drive(position, velocity, goal, told, lifted, n - k, dt, size, mean)
             for body, speed in zip(self._hands, mean.tolist(), strict=True):
                 lib.cpBodySetVelocity(body, speed)
             if met:
@@ -319,8 +329,15 @@ class Space:
 
     def lift(self, paddle: int, up: bool) -> None:
         """Take a paddle off the table, or put it back: a lifted one touches nothing."""
-        mask = 0 if up else pymunk.ShapeFilter.ALL_MASKS()
-        self.paddles[paddle].filter = pymunk.ShapeFilter(mask=mask)
+        self.paddles[paddle].filter = NOTHING if up else EVERYTHING
+
+    def shut(self, mouths: Array) -> None:
+        """Make goal mouths (M,) bool wall, and open the others again."""
+        for mouth, plug in self._plugs.items():
+            plug.filter = EVERYTHING if mouths[mouth] else NOTHING
+            side = self.cast.mouths[mouth].side
+            half = (self.cast.mouths[mouth].width or 0.0) / 2
+            self._sides[side, 5] = 0.0 if mouths[mouth] else half
 
     @property
     def addresses(self) -> tuple[int, ...]:

@@ -66,20 +66,26 @@ def falling(draws: Draws, cast: Cast) -> State:
     return state
 
 
-def serve(draws: Draws, state: State, puck: int, toward: Array) -> None:
-    """Put a puck to the centre, on its way toward an end: in place.
+def serve(
+    draws: Draws, state: State, puck: int, heading: Array, rows: Array | None = None
+) -> None:
+    """Put a puck to the centre, on its way at 0.5 m/s within 0.3 rad of a heading.
+
+    In place; paddles stay where they are. Several pucks have places beside each other.
 
     Args:
         draws: one stream a row.
-        state: rows (W,), paddles staying where they are.
-        puck: index of the body.
-        toward: (W,) -1 toward home, 1 toward the far end.
+        state: rows (W,).
+        puck: which.
+        heading: (W,) or (), rad in the table frame.
+        rows: (W,) bool: which rows are served; None for all.
     """
-    angle = draws.uniform(-0.3, 0.3)
-    state.position[:, puck] = 0.0
-    state.velocity[:, puck, 0] = 0.5 * toward * np.cos(angle)
-    state.velocity[:, puck, 1] = 0.5 * np.sin(angle)
-    state.touching[:, :, puck - state.bodies.paddles] = False
+    angle = heading + draws.uniform(-0.3, 0.3)
+    place = np.array([0.0, 0.12 * (puck - 0.5 * (state.bodies.pucks - 1))])
+    motion = 0.5 * np.stack([np.cos(angle), np.sin(angle)], -1)
+    some = slice(None) if rows is None else rows
+    state.puck[some, puck], state.puck_velocity[some, puck] = place, motion[some]
+    state.touching[some, :, puck] = False
 
 
 def puck_gap(state: State) -> Array:

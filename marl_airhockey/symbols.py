@@ -112,11 +112,16 @@ def _zeros_like(a: Any) -> Array:
     return np.zeros(np.shape(a))
 
 
+def _full_like(a: Any, value: float) -> Array:
+    return np.full(np.shape(a), value)
+
+
 SPECIAL: dict[Any, Callable[..., Any]] = {
     np.where: _where,
     np.clip: _clip,
     np.matmul: _matmul,
     np.zeros_like: _zeros_like,
+    np.full_like: _full_like,
 }
 """Functions that are no operation on single elements."""
 

@@ -143,8 +143,8 @@ def make_seat(
 
     ``robot``: what a UR5e can hold with its base 0.25 m behind the low edge, a box of
     0.42 x 0.50 m that begins 78 mm from the edge, with far corners cut at the slope of
-    0.8 that the paper's authors use. ``arcade``: the side's territory less a paddle
-    radius.
+    0.8 that the paper's authors use, as far as it lies in the side's territory.
+    ``arcade``: all of the territory. Centres keep a paddle's radius inside of it.
 
     Args:
         kind: "robot" or "arcade".
@@ -156,6 +156,8 @@ def make_seat(
     if kind not in SEAT_KINDS:
         raise ValueError(f"seats: {kind!r} is unknown; there are {SEAT_KINDS}")
     edge = -float(table.offsets[side])
+    ego = table.rotation(side).T
+    normals = table.normals @ ego
     if kind == "robot":
         near, far, wide, cut = edge + 0.0782, edge + 0.4982, 0.25, 0.08
         slope = cut / 0.8
@@ -167,10 +169,9 @@ def make_seat(
             (far, wide - slope),
             (far - cut, wide),
         ]
-        return Seat(side, tuple(box), speed=0.7, acceleration=7.0, team=team)
-    ego = table.rotation(side).T
-    normals = table.normals @ ego
-    polygon = np.asarray(table.vertices) @ ego
+        polygon, speed, acceleration = np.array(box), 0.7, 7.0
+    else:
+        polygon, speed, acceleration = np.asarray(table.vertices) @ ego, 2.5, 40.0
     for normal, offset in zip(normals, table.offsets, strict=True):
         polygon = clip(polygon, normal, offset - table.paddle_radius)
     own = np.array([1.0, 0.0])
@@ -180,10 +181,10 @@ def make_seat(
         toward, gap = normals[other] - own, table.offsets[other] - table.offsets[side]
         length = np.linalg.norm(toward)
         polygon = clip(polygon, toward / length, gap / length - table.paddle_radius)
-    if not rivals:
+    if not rivals and kind == "arcade":
         polygon = clip(polygon, -own, -table.paddle_radius)
     reach = tuple((float(x), float(y)) for x, y in polygon)
-    return Seat(side, reach, speed=2.5, acceleration=40.0, team=team)
+    return Seat(side, reach, speed, acceleration, team)
 
 
 def clip(polygon: Array, normal: Array, offset: float) -> Array:

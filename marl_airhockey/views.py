@@ -190,19 +190,55 @@ class GoalVelocity(Piece):
 
 
 @dataclass(frozen=True)
-class OwnTally(Piece):
-    """The seat's own number of the memory, which holds one a seat."""
+class Held(Piece):
+    """How long each puck has been in the reach of one's own team, s; see `held`."""
 
-    name: str
-    low: float
-    high: float
-    unit: float
+    most: float
 
     def columns(self, scope: Scope) -> list[Column]:
-        return [Column(f"own_{self.name}", self.low, self.high, self.unit)]
+        names = [f"held_{i}" for i in range(scope.cast.pucks)]
+        return [Column(name, 0.0, self.most, 0.4 * self.most) for name in names]
 
     def write(self, ego: Ego, out: Array) -> None:
-        out[..., 0] = ego.memory[self.name]
+        out[...] = ego.memory["held"]
+
+
+@dataclass(frozen=True)
+class Tally(Piece):
+    """Everybody's number of the memory (..., seats), one's own first, then `Others`."""
+
+    name: str
+    most: float
+
+    def columns(self, scope: Scope) -> list[Column]:
+        others = [f"other_{i}" for i in range(len(scope.cast.seats) - 1)]
+        names = [f"{who}.{self.name}" for who in ("own", *others)]
+        return [Column(name, 0.0, self.most, self.most) for name in names]
+
+    def write(self, ego: Ego, out: Array) -> None:
+        value = ego.memory[self.name]
+        out[..., 0] = value
+        out[..., 1:] = value[..., _others(ego.scope.cast)]
+
+
+@dataclass(frozen=True)
+class Mine(Piece):
+    """Whose number the memory holds: 1 one's own, -1 another's, 0 nobody's.
+
+    ``memory[name]`` is (...) or, one a puck, (..., pucks); see `rewards.last_toucher`.
+    """
+
+    name: str
+
+    def columns(self, scope: Scope) -> list[Column]:
+        names = [f"{self.name}_{i}" for i in range(scope.cast.pucks)]
+        return [Column(name, -1.0, 1.0, 1.0) for name in names]
+
+    def write(self, ego: Ego, out: Array) -> None:
+        who = ego.memory[self.name]
+        rows = who.reshape(*ego.state.time.shape, 1, -1)
+        own = 1.0 + np.arange(len(ego.scope.cast.seats))[:, None]
+        out[...] = np.where(rows == 0.0, 0.0, np.where(rows == own, 1.0, -1.0))
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,12 @@ class World:
         seats = range(len(cast.seats))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = Reach.of(cast.table, cast.seats)
+        table, sides = cast.table, [seat.side for seat in cast.seats]
+        behind = table.offsets[sides] + 2 * table.paddle_radius
+        self._parking = np.zeros((len(sides), 4))
+        self._parking[:, :2] = -table.normals[sides] * behind[:, None]
+        owners = [sides.index(m.side) if m.side in sides else -1 for m in cast.mouths]
+        self._owner = np.array(owners, np.int64)
         self.referee = Referee(scenario, self.reach.turn)
         self.sensor = Sensor(cast, b, physics, dt)
         self.observer = Observer(scenario, self.sensor, physics, observe)
@@ -177,6 +183,10 @@ class World:
         """
         values, before = self.episode.physics, self.state
         asked, told = self._ask(actions)
+        retired, shut = self.scenario.retired(self.memory), None
+        if retired is not None and retired.any():
+            asked, told = self._park(retired, asked, told)
+            shut = retired[:, self._owner] & (self._owner >= 0)
         if self._delay is not None:
             asked = self._delay.push(asked, values["action_delay"])
         self.asked = asked
@@ -194,7 +204,7 @@ class World:
             np.copyto(sent, told[..., 2:], where=np.isfinite(told[..., 2:]))
             self._pushed = (sent - before.paddle_velocity) / self.control_dt
         self.sent = sent
-        after = self.backend.step(Command(sent, told))
+        after = self.backend.step(Command(sent, told, shut))
         verdict = self.referee.judge(
             before, sent, after, self.memory, self.episode, self._limit
         )
@@ -227,6 +237,14 @@ class World:
             told[:, seat.index, :2] = place[:, :2] @ turn
             told[:, seat.index, 2:] = place[:, 2:] @ turn
         return asked, told
+
+    def _park(
+        self, retired: Array, asked: Array, told: Array | None
+    ) -> tuple[Array, Array]:
+        """Asked and told with the paddles of retired seats behind their sides."""
+        told = np.full((*asked.shape[:2], 4), np.nan) if told is None else told
+        told[retired] = np.broadcast_to(self._parking, told.shape)[retired]
+        return np.where(retired[..., None], 0.0, asked), told
 
     def _report(self, verdict: Verdict, excess: Array) -> Step:
         outcome, episode, terms = verdict.outcome, self.episode, verdict.terms

@@ -17,6 +17,7 @@ def test_a_driven_seat_makes_it_a_single_agent_environment():
     env.reset(seed=0)
     assert env.agents == ["paddle_1"]
     assert env.teams == {0: ["paddle_0"], 1: ["paddle_1"]}
+    assert env.group_map == {"team_1": ["paddle_1"]}
     vec = ah.make_vec(Pair(), 4, drivers={"paddle_0": "random"})
     seen, _ = vec.reset(seed=0)
     assert seen.shape == (4, len(env.observation_labels("paddle_1")))
@@ -125,7 +126,7 @@ def test_holding_the_puck_in_a_duel_is_a_foul_and_a_dead_puck_is_served(backend)
     place_puck(world, -0.3, 0.15)
     steps = idle(world, 4.95)
     np.testing.assert_allclose(world.state.puck[:, 0], [[-0.3, 0.15]] * 2, atol=1e-6)
-    held = world.observer.layout.labels.index("own_held")
+    held = world.observer.layout.labels.index("held_0")
     np.testing.assert_allclose(steps[-1].observation[:, :, held], [[4.95, 0.0]] * 2)
     last = idle(world, 0.05)[0]
     assert not last.reward.any()
@@ -151,3 +152,170 @@ def test_a_duel_ends_at_seven_goals_and_the_better_has_won(backend):
     assert world.episode.success.tolist() == [[False, True]] * 2
     assert world.episode.returns.tolist() == [[-2.0, 2.0]] * 2
     assert world.memory["goals"].tolist() == [[0.0, 2.0]] * 2
+
+
+GAMES = {"duel": 2, "doubles": 2, "rally": 2, "free_for_all": 4}
+"""Games and in how many turns their table comes to itself again."""
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_a_turned_game_gives_turned_rewards(name, backend):
+    turns, count = GAMES[name], 64
+    worlds = [ah.make_world(name, count, backend=backend) for _ in range(2)]
+    for world in worlds:
+        world.autoreset = False
+        world.reset(0)
+    seats = len(worlds[0].open)
+    turn, shift = 2 * np.pi / turns, seats // turns
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    rng = np.random.default_rng(0)
+    angle = rng.uniform(-np.pi, np.pi, count)
+    launch = np.stack([np.cos(angle), np.sin(angle)], -1)
+    for world, matrix in zip(worlds, (np.eye(2), rotation), strict=True):
+        rows = world.state.map(np.copy)
+        rows.puck[:, 0] = 0.2 * launch @ matrix.T
+        rows.puck_velocity[:, 0] = 2.0 * launch[:, ::-1] @ matrix.T
+        world._place(np.arange(count), rows, world.memory)
+        world._sensed = world._look()
+    paid = np.zeros(count, bool)
+    for _ in range(30):
+        asked = rng.uniform(-1, 1, (count, seats, 2))
+        one = worlds[0].step(asked)
+        two = worlds[1].step(np.roll(asked, shift, axis=1))
+        live = ~paid & ~one.terminated
+        # A goal is served again with luck of its own, so that is where it ends.
+        paid |= (one.reward != 0).any(-1)
+        turned = np.roll(one.reward, shift, axis=1)
+        np.testing.assert_allclose(turned[live], two.reward[live], atol=1e-9)
+        np.testing.assert_array_equal(one.terminated[live], two.terminated[live])
+    assert paid.sum() > 5
+
+
+@pytest.mark.parametrize("name", ["duel", "doubles"])
+def test_what_one_team_wins_the_other_loses(name, backend):
+    world = ah.make_world(name, 16, backend=backend)
+    world.reset(0)
+    rng, paid = np.random.default_rng(0), 0.0
+    for _ in range(300):
+        reward = world.step(rng.uniform(-1, 1, (16, len(world.open), 2))).reward
+        team = world.scenario.teams
+        np.testing.assert_array_equal(
+            reward[:, team == 0].sum(-1), -reward[:, team == 1].sum(-1)
+        )
+        assert (np.ptp(reward[:, team == 0], axis=-1) == 0).all()
+        paid += np.abs(reward).sum()
+    assert paid > 0
+
+
+def test_two_pucks_are_served_apart_and_both_count(backend):
+    world = ah.make_world("duel", 4, backend=backend, options={"pucks": 2})
+    world.reset(0)
+    rows = world.state.map(np.copy)
+    rows.puck[:], rows.puck_velocity[:] = (
+        [(0.75, 0.06), (-0.75, 0.06)],
+        [(2, 0), (-2, 0)],
+    )
+    world._place(np.arange(4), rows, world.memory)
+    idle(world, 0.2)
+    assert (world.memory["goals"] == 1).all()
+    gap = world.state.puck[:, 0] - world.state.puck[:, 1]
+    assert (np.hypot(*gap.T) > 0.1).all()
+    assert (world.state.puck_velocity[:, 0, 0] > 0.3).all()
+    assert (world.state.puck_velocity[:, 1, 0] < -0.3).all()
+
+
+def shoot(world, side, speed=2.5):
+    """Send the puck through the middle of a side of a polygon, past its paddle."""
+    normal, offset = world.cast.table.normals[side], world.cast.table.offsets[side]
+    place_puck(world, *(-normal * (offset - 0.04)), *(-normal * speed))
+
+
+@pytest.mark.parametrize("sides", [3, 4, 5])
+def test_lives_are_lost_goals_shut_and_the_last_one_wins(backend, sides):
+    options = {"sides": sides, "lives": 2}
+    world = ah.make_world("free_for_all", 3, backend=backend, options=options)
+    world.autoreset = False
+    world.reset(0)
+    total = np.zeros(sides)
+    for side in range(sides - 1):
+        for life in range(2):
+            assert (world.memory["lives"][:, side] == 2 - life).all()
+            shoot(world, side)
+            steps = idle(world, 0.1)
+            total += sum(s.reward for s in steps)[0]
+            heir = side if life == 0 else (side + 1) % sides
+            if heir < sides - 1:
+                out = -world.cast.table.normals[heir]
+                assert (world.state.puck_velocity[:, 0] @ out > 0.45).all()
+    assert total.tolist() == [-2.0] * (sides - 1) + [0.0]
+    assert steps[0].terminated.all() or steps[1].terminated.all()
+    winners = [False] * (sides - 1) + [True]
+    assert world.episode.success.tolist() == [winners] * 3
+
+
+def test_a_goal_without_an_owner_is_a_wall_and_its_paddle_is_away(backend):
+    world = ah.make_world("free_for_all", 2, backend=backend, options={"lives": 1})
+    world.reset(0)
+    shoot(world, 1)
+    idle(world, 0.15)
+    assert (world.memory["lives"] == [1, 0, 1, 1]).all()
+    normal, offset = world.cast.table.normals[1], world.cast.table.offsets[1]
+    assert (world.state.paddle[:, 1] @ normal < -offset).all()
+    shoot(world, 1, 1.0)
+    idle(world, 0.2)
+    assert (world.memory["lives"] == [1, 0, 1, 1]).all()
+    assert (world.state.puck_velocity[:, 0] @ normal > 0.5).all()
+    # Whoever is out cannot act, and comes back with the next episode.
+    asked = np.ones((2, 4, 2))
+    world.step(asked)
+    assert (world.state.paddle[:, 1] @ normal < -offset).all()
+    world.reset(1)
+    assert (world.state.paddle[:, 1] @ normal > -offset).all()
+
+
+def test_a_goal_pays_who_touched_the_puck_last(backend):
+    world = ah.make_world("free_for_all", 2, backend=backend)
+    world.reset(0)
+    # Seat 0 pushes the puck across to side 2, whose paddle stands aside.
+    rows = world.state.map(np.copy)
+    rows.paddle[:, 0], rows.paddle[:, 2] = (-0.2, 0.0), (0.3, 0.3)
+    rows.puck[:, 0], rows.puck_velocity[:, 0] = (-0.1, 0.0), (0.0, 0.0)
+    world._place(np.arange(2), rows, world.memory)
+    asked = np.zeros((2, 4, 2))
+    total = np.zeros((2, 4))
+    for step in range(20):
+        asked[:, 0, 0] = 1.0 if step < 3 else 0.0
+        total += world.step(asked).reward
+    assert total.tolist() == [[1.0, 0.0, -1.0, 0.0]] * 2
+
+
+def test_a_rally_counts_crossings_by_turns(backend):
+    world = ah.make_world("rally", 2, backend=backend)
+    world.autoreset = False
+    world.reset(0)
+    place_puck(world, -0.2, 0.2, 1.0)
+    assert not sum(s.reward for s in idle(world, 0.5)).any(), "nobody had struck it"
+    for toucher, paid in ((1, 1.0), (1, 0.0), (2, 1.0), (1, 1.0)):
+        world.memory["toucher"][:] = toucher
+        way = 1.0 if toucher == 1 else -1.0
+        place_puck(world, -0.1 * way, 0.2, way)
+        reward = sum(s.reward for s in idle(world, 0.3))
+        assert reward.tolist() == [[paid, paid]] * 2
+    place_puck(world, -0.1, 0.2, 0.04)
+    assert idle(world, 0.05)[0].terminated.all()
+
+
+def test_mates_are_paid_for_striking_in_turn(backend):
+    world = ah.make_world("team_juggle", 2, backend=backend)
+    world.autoreset = False
+    world.reset(0)
+    for striker, paid in ((1, 0.0), (2, 1.0), (2, 0.0), (1, 1.0)):
+        world.memory["armed"][:], world.memory["struck_at"][:] = 1.0, -0.5
+        world.memory["striker"][:] = striker
+        place_puck(world, -0.35, 0.0, 2.0)
+        terms = [s.terms["pass"] for s in idle(world, 0.1)]
+        assert sum(terms).tolist() == [[paid, paid]] * 2
+    assert (world.memory["passes"] == 2).all()
+    reaches = [np.asarray(seat.reach)[:, 1] for seat in world.cast.seats]
+    assert reaches[0].min() > 0.049
+    assert reaches[1].max() < -0.049

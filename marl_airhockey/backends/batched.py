@@ -79,7 +79,8 @@ class Batched(Backend):
         last = self._last
         position, velocity, time, *happened = self._pool.take(self.num_worlds)
         path = np.empty(self._path_shape)
-        order = Order(*self._follow(command, last.position))
+        shut = self._open if command.shut is None else command.shut
+        order = Order(*self._follow(command, last.position), shut)
         motion = Motion(position, velocity, path, self._push, time)
         events = Events(*(*happened, self._leaning, self._out))
         batch = Batch(self._ground, self._laws, order, last, motion, events)

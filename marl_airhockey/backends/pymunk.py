@@ -28,6 +28,7 @@ class Pymunk(Backend):
         self.spaces = [Space(cast, control_dt, substeps, row) for row in self._flags]
         self._worlds = np.array([s.addresses for s in self.spaces], np.int64)
         self.state = self.quiet
+        self._shut = self._open
         self._kicks = np.zeros((num_worlds, len(cast.bodies)))
         self._eventful: list[int] = []
         """Worlds in which something touched or crossed at the end of the last step."""
@@ -58,10 +59,15 @@ class Pymunk(Backend):
         goal, told, lifted = self._follow(command, position)
         if command.told is not None:
             self._lift(lifted, True)
+        shut = self._open if command.shut is None else command.shut
+        for i in np.flatnonzero((shut != self._shut).any(-1)).tolist():
+            self.spaces[i].shut(shut[i])
+        self._shut = shut
         for i in self._eventful:
             self.spaces[i].begin()
-        for i in self._drift(goal, told, position, velocity, path):
-            self._finish(i, goal[i], told[i], position[i], velocity[i], path[i])
+        for i in self._drift(goal, told, lifted, position, velocity, path):
+            hands = goal[i], told[i], lifted[i]
+            self._finish(i, *hands, position[i], velocity[i], path[i])
         time = old.time + self.control_dt
         if self.cast.path:
             path[..., 2] += self._kicks[:, None, : path.shape[2]]
@@ -79,7 +85,13 @@ class Pymunk(Backend):
         return new
 
     def _drift(
-        self, goal: Array, told: Array, position: Array, velocity: Array, path: Array
+        self,
+        goal: Array,
+        told: Array,
+        lifted: Array,
+        position: Array,
+        velocity: Array,
+        path: Array,
     ) -> list[int]:
         """Step the quiet worlds in compiled code; those that Python must finish."""
         flags, self._eventful = self._flags, []
@@ -90,6 +102,7 @@ class Pymunk(Backend):
             self._worlds,
             goal,
             told,
+            lifted,
             self._kicks,
             self.control_dt / self.substeps,
             self.substeps,
@@ -106,6 +119,7 @@ class Pymunk(Backend):
         i: int,
         goal: Array,
         told: Array,
+        lifted: Array,
         position: Array,
         velocity: Array,
         path: Array,
@@ -114,7 +128,7 @@ class Pymunk(Backend):
         space, seats = self.spaces[i], len(goal)
         speeds = velocity[:seats].copy()
         path_or_none = path if self.cast.path else None
-        space.step(position[:seats], speeds, goal, told, path_or_none)
+        space.step(position[:seats], speeds, goal, told, lifted, path_or_none)
         rows = space.read()
         position[: len(rows)], velocity[: len(rows)] = rows[:, :2], rows[:, 2:]
         velocity[: len(rows), 0] += self._kicks[i, : len(rows)]

@@ -1,0 +1,159 @@
+"""Everybody for themselves: a polygon with a goal and three lives for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey import rewards, starts, views
+from marl_airhockey.cast import Cast, Mouth
+from marl_airhockey.draws import Draws
+from marl_airhockey.layout import Piece
+from marl_airhockey.scenario import Scenario
+from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.table import Table
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeForAll(Scenario):
+    """A goal costs its owner a life and 1; it pays 1 to whoever touched the puck last.
+
+    Without lives a seat is out: its goal becomes wall and its paddle is parked. The
+    last one left has won. Serves go to whoever lost a life; a puck that is held for
+    ``possession`` seconds or lies out of every reach goes to the next one.
+    """
+
+    seats: str = "arcade"
+    seconds: float = 90.0
+    sides: int = 4
+    """Sides of the table, and seats."""
+    inradius: float = 0.45
+    """m from the centre to each side."""
+    lives: int = 3
+    """Goals that a seat can take."""
+    mouth: float = 0.30
+    """m: width of the goal mouths."""
+    possession: float = 5.0
+    """s: for so long a seat may have the puck in its reach."""
+    jitter_weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.sides < 3:
+            raise ValueError(f"sides: {self.sides} must be at least 3")
+
+    @cached_property
+    def table_geometry(self) -> Table:
+        return Table.regular(self.sides, self.inradius)
+
+    @cached_property
+    def cast(self) -> Cast:
+        sides = tuple(range(self.sides))
+        seats = tuple(self.seat(side, sides, team=side) for side in sides)
+        mouths = tuple(Mouth(f"goal_{side}", side, self.mouth) for side in sides)
+        flat = {"tilt": 0.0}
+        return Cast(self.table_geometry, seats, pucks=1, mouths=mouths, physics=flat)
+
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
+        state, table = starts.first_state(self.cast, worlds), self.table_geometry
+        state.paddle[:] = -0.7 * table.offsets[0] * table.normals
+        first = np.floor(draws.uniform(0.0, self.sides))
+        starts.serve(draws, state, 0, self._toward(first))
+        return state, {
+            **rewards.no_touches(worlds, self.sides, 1),
+            "lives": np.full((worlds, self.sides), float(self.lives)),
+            "held": np.zeros((worlds, self.sides, 1)),
+            "lying": np.zeros((worlds, 1)),
+            "toucher": np.zeros((worlds, 1)),
+            "scorer": np.zeros((worlds, 1)),
+            "served": first,
+            "serve": np.full(worlds, -1.0),
+        }
+
+    def _toward(self, side: Array) -> Array:
+        """(W,) headings from the centre to sides, rad."""
+        return np.asarray(np.pi + 2.0 * np.pi * side / self.sides)
+
+    def remember(
+        self, memory: Memory, before: State, sent: Array, after: State
+    ) -> Memory:
+        lost = after.crossed[..., 0, :] & (memory["lives"] > 0.0)
+        lives = memory["lives"] - lost
+        held = rewards.held(self.cast, memory["held"], before, after)
+        lying = rewards.lying(memory["lying"], held, before, after)
+        foul = (held[..., 0] >= self.possession - 1e-9) & (lives > 0.0)
+        dead = (lying[..., 0] >= 1.0 - 1e-9) & ~lost.any(-1)
+        serve = np.full_like(memory["served"], -1.0)
+        for side in range(self.sides):
+            follower = self._follower(lives, side)
+            heir = np.where(lives[..., side] > 0.0, float(side), follower)
+            again = foul[..., side] | (dead & (memory["served"] == side))
+            serve = np.where(again, follower, serve)
+            serve = np.where(lost[..., side], heir, serve)
+        fresh = serve >= 0.0
+        toucher = rewards.last_toucher(memory["toucher"], after)
+        return {
+            "lives": lives,
+            "held": np.where(fresh[..., None, None], 0.0, held),
+            "lying": np.where(fresh[..., None], 0.0, lying),
+            "toucher": np.where(fresh[..., None], 0.0, toucher),
+            "scorer": toucher,
+            "served": np.where(fresh, serve, memory["served"]),
+            "serve": serve,
+        }
+
+    def _follower(self, lives: Array, side: int) -> Array:
+        """(...) the next seat after a side's that has lives."""
+        follower = np.full_like(lives[..., 0], float(side))
+        for step in range(self.sides - 1, 0, -1):
+            other = (side + step) % self.sides
+            follower = np.where(lives[..., other] > 0.0, float(other), follower)
+        return follower
+
+    @property
+    def observation(self) -> tuple[Piece, ...]:
+        return (
+            views.Own(),
+            views.Others(),
+            views.Pucks(),
+            views.PucksFromOwn(),
+            views.Held(self.possession),
+            views.Tally("lives", self.lives),
+        )
+
+    def reward_terms(
+        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+    ) -> dict[str, Array]:
+        lost = old["lives"] - new["lives"]
+        own = 1.0 + np.arange(self.sides)
+        scored = (new["scorer"] == own) & (lost.sum(-1, keepdims=True) > 0.0)
+        return {"conceded": -lost, "scored": 1.0 * (scored & (lost == 0.0))}
+
+    def terminated(self, after: State, memory: Memory) -> Array:
+        return np.asarray((1.0 * (memory["lives"] > 0.0)).sum(-1) <= 1.0)
+
+    def restart(
+        self, draws: Draws, after: State, memory: Memory
+    ) -> tuple[Array, State, Memory] | None:
+        worlds = np.flatnonzero(memory["serve"] >= 0.0)
+        if not len(worlds):
+            return None
+        rows = after.map(lambda x: x[worlds])
+        toward = self._toward(memory["serve"][worlds])
+        starts.serve(draws.select(worlds), rows, 0, toward)
+        return worlds, rows, {name: value[worlds] for name, value in memory.items()}
+
+    def retired(self, memory: Memory) -> Array | None:
+        return np.asarray(memory["lives"] <= 0.0)
+
+    def caption(self, memory: Memory) -> str:
+        return "lives " + " : ".join(f"{lives:.0f}" for lives in memory["lives"])
+
+    def success(self, after: State, memory: Memory) -> Array:
+        alive = memory["lives"] > 0.0
+        return np.asarray(alive & self.terminated(after, memory)[..., None])
+
+
+make = FreeForAll

@@ -1,0 +1,91 @@
+"""Keep the puck going to and fro, together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey import rewards, starts, views
+from marl_airhockey.cast import Cast
+from marl_airhockey.draws import Draws
+from marl_airhockey.scenario import Scenario
+from marl_airhockey.state import Array, Memory, State
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rally(Scenario):
+    """A crossing of the middle pays both 1 if the seat that it leaves struck it.
+
+    That seat must not be the one of the last counted crossing. ``patience`` seconds
+    without a counted one end the rally, and so does a puck that lies.
+    """
+
+    seats: str = "arcade"
+    seconds: float = 30.0
+    crossings: int = 15
+    """Counted crossings that make a success."""
+    patience: float = 4.0
+    """s"""
+    jitter_weight: float = 0.0
+
+    @cached_property
+    def cast(self) -> Cast:
+        seats = self.seat(0, (2,)), self.seat(2, (0,))
+        return Cast(self.table_geometry, seats, pucks=1, physics={"tilt": 0.0})
+
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
+        state = starts.first_state(self.cast, worlds)
+        state.paddle[..., 0] = 0.7 * self.table_geometry.offsets[0] * np.array([-1, 1])
+        toward = np.where(draws.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
+        starts.serve(draws, state, 0, toward)
+        names = ("toucher", "counted", "crossings", "idle")
+        none = {name: np.zeros(worlds) for name in names}
+        return state, {**rewards.no_touches(worlds, 2, 1), **none}
+
+    def remember(
+        self, memory: Memory, before: State, sent: Array, after: State
+    ) -> Memory:
+        old = memory["toucher"]
+        toucher = rewards.last_toucher(old[..., None], after)[..., 0]
+        left = before.puck[..., 0, 0] < 0.0
+        crossed = left != (after.puck[..., 0, 0] < 0.0)
+        # Numbers count from 1, as `last_toucher` does.
+        seat = np.where(left, 1.0, 2.0)
+        counts = crossed & ((toucher == seat) | (old == seat))
+        counts = counts & (memory["counted"] != seat)
+        return {
+            "toucher": toucher,
+            "counted": np.where(counts, seat, memory["counted"]),
+            "crossings": memory["crossings"] + counts,
+            "idle": np.where(counts, 0.0, memory["idle"] + after.time - before.time),
+        }
+
+    observation = (
+        views.Own(),
+        views.Others(),
+        views.Pucks(),
+        views.PucksFromOwn(),
+        views.Mine("toucher"),
+        views.Mine("counted"),
+    )
+
+    def reward_terms(
+        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+    ) -> dict[str, Array]:
+        counted = new["crossings"] - old["crossings"]
+        return {"crossing": counted[..., None] * np.ones(2)}
+
+    def terminated(self, after: State, memory: Memory) -> Array:
+        slow = rewards.length(after.puck_velocity[..., 0, :]) < rewards.SLOW
+        return np.asarray(slow | (memory["idle"] >= self.patience - 1e-9))
+
+    def caption(self, memory: Memory) -> str:
+        return f"crossings {memory['crossings']:.0f}"
+
+    def success(self, after: State, memory: Memory) -> Array:
+        return np.asarray(memory["crossings"] >= self.crossings)
+
+
+make = Rally

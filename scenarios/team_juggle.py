@@ -1,0 +1,110 @@
+"""Keep pucks up together, striking in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey import rewards, starts, views
+from marl_airhockey.cast import Cast, Mouth
+from marl_airhockey.draws import Draws
+from marl_airhockey.scenario import Mark, Scenario
+from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.table import Seat, clip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TeamJuggle(Scenario):
+    """A hit that raises a puck by ``lift`` pays both 1 if the other made the last one.
+
+    The seats stand side by side at home, each with its own half of the width; a puck
+    that reaches home ends the episode.
+    """
+
+    seconds: float = 30.0
+    pucks: int = 1
+    """Pucks to be kept up at once."""
+    lift: float = 0.2
+    """m: how far a hit must raise the puck's centre."""
+    passes: int = 8
+    """Paid hits that make a success."""
+    gap: float = 0.10
+    """m between the reaches of the seats."""
+
+    @cached_property
+    def cast(self) -> Cast:
+        home = Mouth("home", 0)
+        seats = self._half(1.0), self._half(-1.0)
+        return Cast(self.table_geometry, seats, pucks=self.pucks, mouths=(home,))
+
+    def _half(self, side: float) -> Seat:
+        seat = self.seat()
+        normal = np.array([0.0, side])
+        half = clip(np.asarray(seat.reach), normal, -self.gap / 2)
+        return replace(seat, reach=tuple((float(x), float(y)) for x, y in half))
+
+    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(draws, self.cast)
+        state.paddle[:] = [(-0.65, 0.15), (-0.65, -0.15)]
+        names = ("armed", "struck_at", "striker", "passer")
+        none = {name: np.zeros((worlds, self.pucks)) for name in names}
+        return state, {
+            **rewards.no_touches(worlds, 2, self.pucks),
+            **none,
+            "passes": np.zeros(worlds),
+        }
+
+    def remember(
+        self, memory: Memory, before: State, sent: Array, after: State
+    ) -> Memory:
+        height = rewards.contact_height(before, after)
+        struck = ~np.isnan(height)
+        struck_at = np.where(struck, height, memory["struck_at"])
+        armed = np.where(struck, 1.0, memory["armed"])
+        striker = rewards.last_toucher(memory["striker"], after)
+        risen = (armed > 0) & (after.puck[..., 0] >= struck_at + self.lift)
+        passer = memory["passer"]
+        passed = risen & (passer > 0) & (passer != striker)
+        return {
+            "armed": np.where(risen, 0.0, armed),
+            "struck_at": struck_at,
+            "striker": striker,
+            "passer": np.where(risen, striker, passer),
+            "passes": memory["passes"] + passed.sum(-1),
+        }
+
+    observation = (
+        views.Own(),
+        views.Others(),
+        views.Pucks(),
+        views.PucksFromOwn(),
+        views.Recall("armed", 0.0, 1.0, 1.0),
+        views.Recall("struck_at", -1.0, 1.0, 1.0, from_own=True),
+        views.Mine("striker"),
+        views.Mine("passer"),
+    )
+
+    def reward_terms(
+        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+    ) -> dict[str, Array]:
+        passed = new["passes"] - old["passes"]
+        return {"pass": passed[..., None] * np.ones(2)}
+
+    def terminated(self, after: State, memory: Memory) -> Array:
+        return np.asarray(after.crossed[..., 0].any(-1))
+
+    def caption(self, memory: Memory) -> str:
+        return f"passes {memory['passes']:.0f}"
+
+    def success(self, after: State, memory: Memory) -> Array:
+        return np.asarray(memory["passes"] >= self.passes)
+
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
+        wide = float(self.table_geometry.size[1]) / 2
+        armed = memory["struck_at"][memory["armed"] > 0]
+        return [Mark.line((x + self.lift, -wide), (x + self.lift, wide)) for x in armed]
+
+
+make = TeamJuggle
