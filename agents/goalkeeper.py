@@ -6,35 +6,39 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from marl_airhockey import tactics
 from marl_airhockey.driver import Driver, View
 from marl_airhockey.state import Array
 
 
 @dataclass
 class Goalkeeper(Driver):
-    """Follows the nearest approaching puck sideways on a line near the own end."""
+    """Goes where the nearest puck will cross a line before the own end, banks included.
 
-    depth: float = 0.08
+    Raises:
+        ValueError: an unknown strength.
+    """
+
+    strength: str = "strong"
+    """"weak", "fair" or "strong"."""
+    depth: float = 0.03
     """m: distance of the line from the near edge of the reach."""
     gain: float = 8.0
     """1/s: asked speed for a metre of distance."""
+
+    def __post_init__(self) -> None:
+        self._skill = tactics.skill(self.strength)
 
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
         own = view.state.paddle[:, view.seat]
-        line = view.reach[:, 0].min() + self.depth
         if view.state.bodies.pucks == 0:
+            line = view.reach[:, 0].min() + self.depth
             return np.stack([line - own[:, 0], -own[:, 1]], -1) * self.gain, memory
-        puck, velocity = view.state.puck, view.state.puck_velocity
-        rows = np.arange(len(own))
-        urgent = np.where(velocity[..., 0] < 0, puck[..., 0], 9.0).argmin(-1)
-        place, speed = puck[rows, urgent], velocity[rows, urgent]
-        due = np.clip((place[:, 0] - line) / np.maximum(-speed[:, 0], 0.3), 0.0, 0.3)
-        wide = np.abs(view.reach[:, 1]).max()
-        aside = np.clip(place[:, 1] + due * speed[:, 1], -wide, wide)
-        target = np.stack([np.full_like(aside, line), aside], -1)
-        return (target - own) * self.gain / view.top_speed[:, None], memory
+        field = tactics.Field.of(view.cast, view.seat)
+        target = tactics.guard(view, field, self.depth, self._skill.lag)
+        return tactics.paced((target - own) * self.gain, view, self._skill.pace), memory
 
 
 make = Goalkeeper

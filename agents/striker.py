@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from marl_airhockey import tactics
 from marl_airhockey.driver import Driver, View
 from marl_airhockey.rewards import length
 from marl_airhockey.state import Array
@@ -15,9 +16,15 @@ from marl_airhockey.state import Array
 class Striker(Driver):
     """Waits behind the meeting point and strikes through it; one puck at a time.
 
-    It aims at the goal, at the first block, or straight up the middle. A puck at rest
-    is struck where it lies.
+    It aims at the goal, at the first block, or straight up the middle; in games, at the
+    open goal. A puck at rest is struck where it lies.
+
+    Raises:
+        ValueError: an unknown strength.
     """
+
+    strength: str = "strong"
+    """In games: "weak", "fair" or "strong"."""
 
     meet_at: float = 0.22
     """m from the near edge of the reach: where a falling puck is met."""
@@ -30,6 +37,9 @@ class Striker(Driver):
     gain: float = 9.0
     """1/s: asked speed for a metre of distance."""
 
+    def __post_init__(self) -> None:
+        self._skill = tactics.skill(self.strength)
+
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
@@ -37,6 +47,8 @@ class Striker(Driver):
         own, top = state.paddle[:, view.seat], view.top_speed[:, None]
         if not state.bodies.pucks:
             return np.zeros_like(own), memory
+        if view.cast.physics.get("tilt") == 0.0 and len(view.cast.seats) > 1:
+            return self._play(view), memory
         low = view.reach[:, 0].min()
         which = (state.puck[..., 0] + 0.4 * state.puck_velocity[..., 0]).argmin(-1)
         puck, velocity = state.puck[rows, which], state.puck_velocity[rows, which]
@@ -65,6 +77,17 @@ class Striker(Driver):
         calm = np.where((rising & (due > 0.9))[:, None], home, wait)
         asked = np.where(strike[:, None], through, (calm - own) * self.gain)
         return asked / top, memory
+
+    def _play(self, view: View) -> Array:
+        """In a game on a level table: strike, or wait at home."""
+        field, (pace, lag) = tactics.Field.of(view.cast, view.seat), self._skill
+        aim = tactics.open_goal(view, field)
+        strike, due = tactics.attack(view, field, aim, pace, lag)
+        own, low = view.state.paddle[:, view.seat], view.reach[:, 0].min()
+        home = (np.array([low + 0.2, 0.0]) - own) * self.gain
+        return tactics.paced(
+            np.where(np.isfinite(due)[:, None], strike, home), view, pace
+        )
 
     def _meeting(
         self, puck: Array, velocity: Array, line: float

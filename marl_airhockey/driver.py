@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Self
 
+from marl_airhockey.cast import Cast
 from marl_airhockey.draws import Draws
 from marl_airhockey.state import Array, State
 from marl_airhockey.table import Seat
@@ -21,6 +22,8 @@ from marl_airhockey.table import Seat
 class View:
     """What one seat senses in B worlds."""
 
+    cast: Cast
+    """Who and what is on the table."""
     state: State
     """The sensed state, rotated into the seat's ego frame."""
     observation: Array | Mapping[str, Array]

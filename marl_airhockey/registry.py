@@ -76,17 +76,31 @@ def make_agent(name: str, **options: Any) -> Driver:
 def make_driver(text: str | Path) -> Driver:
     """A driver by its name, or a policy by the path of its file or run folder.
 
+    Options follow the name: ``allround:strength=fair,depth=0.05``.
+
     Raises:
-        ValueError: neither the one nor the other.
+        ValueError: neither the one nor the other, or a bad option.
     """
-    path = Path(text)
-    if str(text) in agent_names():
-        return make_agent(str(text))
+    path, (name, _, options) = Path(text), str(text).partition(":")
+    if name in agent_names():
+        return make_agent(
+            name, **dict(_option(part) for part in options.split(",") if part)
+        )
     if path.exists() or path.suffix in (".zip", ".onnx"):
         return make_agent("policy", path=path)
     raise ValueError(
         unknown("driver", text, agent_names()) + "; or the path of a policy"
     )
+
+
+def _option(part: str) -> tuple[str, str | float]:
+    name, equals, value = part.partition("=")
+    if not equals:
+        raise ValueError(f"option {part!r}: expected NAME=VALUE")
+    try:
+        return name, float(value)
+    except ValueError:
+        return name, value
 
 
 def find_backend(name: str) -> type[Backend]:

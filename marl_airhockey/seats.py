@@ -89,6 +89,7 @@ class Driven:
             position, velocity = turned
             ego = replace(sensed, position=position, velocity=velocity)
         return View(
+            cast=self._observer.scenario.cast,
             state=ego,
             observation=(
                 {k: v[:, 0] for k, v in shown.items()}

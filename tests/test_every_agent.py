@@ -6,6 +6,7 @@ from pair import Pair
 
 import marl_airhockey as ah
 from marl_airhockey.match import evaluate
+from marl_airhockey.registry import make_driver
 
 
 def play(scenario, agent, worlds, steps, seed, **keywords):
@@ -110,3 +111,35 @@ def test_a_told_paddle_follows_its_driver():
     np.testing.assert_allclose(
         world.state.paddle_velocity[0, 1], [-0.2, 0.0], atol=1e-12
     )
+
+
+def score(first, second, games=60):
+    """Wins and half the draws of the first, as a share."""
+    drivers = {"paddle_0": first, "paddle_1": second}
+    world = ah.make_world("duel", games, backend="batched", drivers=drivers)
+    world.autoreset, goals = False, np.zeros((games, 2))
+    world.reset(7)
+    playing = np.ones(games, bool)
+    while playing.any():
+        step = world.step(np.zeros((games, 0, 2)))
+        goals[playing] = world.memory["goals"][playing]
+        playing &= ~(step.terminated | step.truncated)
+    return (np.sign(goals[:, 0] - goals[:, 1]) / 2 + 0.5).mean()
+
+
+@pytest.mark.parametrize("script", ["goalkeeper", "striker", "allround"])
+def test_a_stronger_opponent_plays_better(script):
+    names = [f"{script}:strength={level}" for level in ("weak", "fair", "strong")]
+    scores = [score(name, "striker") for name in names]
+    assert scores == sorted(scores)
+    assert scores[-1] > scores[0] + 0.2
+    assert score(names[0], "random") > 0.7
+
+
+def test_options_of_a_driver_are_named_when_they_are_wrong():
+    with pytest.raises(ValueError, match="unknown strength 'strog'"):
+        make_driver("striker:strength=strog")
+    with pytest.raises(ValueError, match="expected NAME=VALUE"):
+        make_driver("striker:weak")
+    with pytest.raises(ValueError, match="strenght"):
+        make_driver("striker:strenght=weak")

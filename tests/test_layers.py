@@ -12,7 +12,7 @@ LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
-    | {"symbols", "pool", "versus", "loops", "fuse", "threads"},
+    | {"symbols", "pool", "versus", "tactics", "loops", "fuse", "threads"},
     {
         "backends",
         "chipmunk",
