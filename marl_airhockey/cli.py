@@ -1,75 +1,40 @@
-"""The command line: ``airhockey list | train | evaluate | watch | demo``."""
+"""The command line: ``airhockey list | train | evaluate | watch | league | bench``."""
 
 from __future__ import annotations
 
 import json
 import sys
-import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from marl_airhockey import cli_games
 from marl_airhockey.catalogue import describe, summary
-from marl_airhockey.extras import need
-from marl_airhockey.make import Keywords
-from marl_airhockey.match import TEST_SEED, Result, evaluate
-from marl_airhockey.registry import agent_names, make_agent, make_driver
-
-app = typer.Typer(
-    help="Air hockey for robot learning and multi-agent RL.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
+from marl_airhockey.cli_common import (
+    AsJson,
+    Backend,
+    Drivers,
+    Options,
+    Profile,
+    Scenario,
+    app,
+    bar,
+    console,
+    environment,
+    grade,
+    settings,
 )
-console = Console()
+from marl_airhockey.extras import need
+from marl_airhockey.learn.policy import Policy
+from marl_airhockey.match import TEST_SEED, Result, evaluate
+from marl_airhockey.registry import make_driver
+
 FLOORS = ("still", "random", "sticky")
-
-Scenario = Annotated[str, typer.Option("--scenario", "-s", help="Name of a scenario.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
-Backend = Annotated[str, typer.Option(help="Physics.")]
-Profile = Annotated[str, typer.Option(help="ideal, or robot: delays and noise.")]
-Options = Annotated[
-    list[str] | None,
-    typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
-]
-Drivers = Annotated[
-    list[str] | None,
-    typer.Option("--driver", help="Who drives another seat, AGENT=NAME; repeatable."),
-]
-
-
-def settings(pairs: list[str] | None) -> dict[str, Any]:
-    """NAME=VALUE pairs; values as in TOML, bare words as strings.
-
-    Raises:
-        ValueError: a pair without "=".
-    """
-    chosen: dict[str, Any] = {}
-    for pair in pairs or []:
-        name, equals, value = pair.partition("=")
-        if not equals:
-            raise ValueError(f"{pair!r}: expected NAME=VALUE")
-        try:
-            chosen[name] = tomllib.loads(f"v = {value}")["v"]
-        except tomllib.TOMLDecodeError:
-            chosen[name] = value
-    return chosen
-
-
-def environment(
-    backend: str, profile: str, option: list[str] | None, driver: list[str] | None
-) -> Keywords:
-    """Keywords of an environment from the options that commands share."""
-    return {
-        "backend": backend,
-        "profile": profile,
-        "options": settings(option),
-        "drivers": settings(driver),
-    }
+app.command()(cli_games.league)
 
 
 @app.command("list")
@@ -149,7 +114,8 @@ def train(
         task = progress.add_task(folder.name, total=None, note="")
 
         def report(done: int, total: int, row: dict[str, float]) -> None:
-            note = f"success {row['success']:.2f}" if row else ""
+            name = grade(row)
+            note = f"{name} {row[name]:.2f}" if row else ""
             progress.update(task, completed=done, total=total, note=note)
 
         row = run(config, folder, report)
@@ -157,8 +123,7 @@ def train(
         console.print_json(json.dumps({"run": str(folder), **row}))
         return
     console.print(
-        f"{folder}: success {row['success']:.3f} "
-        f"(sampled {row['success_sampled']:.3f}) after {row['steps']:,} steps "
+        f"{folder}: {grade(row)} {row[grade(row)]:.3f} after {row['steps']:,.0f} steps "
         f"and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
     )
     name = scenario or "SCENARIO"
@@ -184,9 +149,9 @@ def evaluate_driver(
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     seated = make_driver(driver)
     entries = [(driver, seated)]
-    if driver not in agent_names():
-        policy = make_agent("policy", path=driver, deterministic=False)
-        entries.append((f"{driver} (sampled)", policy))
+    if isinstance(seated, Policy):
+        sampled = replace(seated, deterministic=False)
+        entries.append((f"{driver} (sampled)", sampled))
     if floors:
         entries += [(f, make_driver(f)) for f in FLOORS if f != driver]
     results: list[Result] = []
@@ -331,7 +296,8 @@ def demo(
         task = progress.add_task(f"learning to {scenario}", total=None, note="")
 
         def report(done: int, total: int, row: dict[str, float]) -> None:
-            note = f"success {row['success']:.2f}" if row else ""
+            name = grade(row)
+            note = f"{name} {row[name]:.2f}" if row else ""
             progress.update(task, completed=done, total=total, note=note)
 
         results, files = run(scenario, out, steps, report)
@@ -343,18 +309,6 @@ def demo(
         f"  airhockey watch {out / 'run'} --scenario {scenario}\n"
         "  airhockey train hit_goal && airhockey evaluate runs/hit_goal-0 -s hit_goal\n"
         "  airhockey list"
-    )
-
-
-def bar() -> Progress:
-    """A progress bar on standard error, so that output can be piped."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=Console(stderr=True),
     )
 
 

@@ -77,7 +77,7 @@ def build_world(
             )
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
-    game = _scenario(scenario, keywords)
+    game = find_scenario(scenario, keywords)
     cast = game.cast
     name = keywords.get("backend", "pymunk")
     kind = find_backend(name)
@@ -121,7 +121,8 @@ def _check_times(control_dt: float, substeps: int, max_cycles: int | None) -> No
         raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
 
 
-def _scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
+def find_scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
+    """The scenario that keywords ask for."""
     options = dict(keywords.get("options", {}))
     for shared in ("seats", "goals"):
         if shared in keywords:

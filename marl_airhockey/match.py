@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.driver import Driver
-from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.make import Keywords, build_world, find_scenario
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
+from marl_airhockey.stats import interval
 from marl_airhockey.world import World
 
 TEST_SEED = 2_000_000
@@ -86,23 +87,20 @@ class Result:
         return data
 
 
-def interval(share: float, n: int) -> tuple[float, float]:
-    """95 % interval of a share of n trials (Wilson, 1927)."""
-    z = 1.96
-    middle = (share + z * z / (2 * n)) / (1 + z * z / n)
-    half = z / (1 + z * z / n) * np.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
-    return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
-
-
 def seat_world(
     driver: Driver, scenario: str | Scenario, num_worlds: int, keywords: Keywords
 ) -> World:
-    """Worlds in which a driver sits at ``paddle_0`` and every seat is driven.
+    """Worlds in which a driver sits at ``paddle_0`` and at its mates' seats.
+
+    All other seats must be driven, too.
 
     Raises:
         ValueError: a seat that nobody drives, named.
     """
-    drivers = {**keywords.get("drivers", {}), "paddle_0": driver}
+    cast = find_scenario(scenario, keywords).cast
+    team = [i for i, s in enumerate(cast.seats) if s.team == cast.seats[0].team]
+    mates = {f"paddle_{i}": driver for i in team}
+    drivers = {**mates, **keywords.get("drivers", {}), "paddle_0": driver}
     seated: Keywords = {**keywords, "drivers": drivers}
     world = build_world(scenario, num_worlds, autoreset=False, keywords=seated)
     if len(world.open):
@@ -224,7 +222,7 @@ class _Tally:
 def _act_ms(world: World) -> float:
     """Median CPU time of a decision of paddle_0 in a single world, ms."""
     seat = world.driven[0]
-    view = seat.view(world._sensed, world.memory, world.episode.physics)
+    view = seat.view(world.sensed, world.memory, world.episode.physics)
     state = view.state.map(lambda x: x[:1])
     seen = view.observation
     one = {k: v[:1] for k, v in seen.items()} if isinstance(seen, Mapping) else seen[:1]

@@ -86,7 +86,7 @@ def make_driver(text: str | Path) -> Driver:
         return make_agent(
             name, **dict(_option(part) for part in options.split(",") if part)
         )
-    if path.exists() or path.suffix in (".zip", ".onnx"):
+    if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
         return make_agent("policy", path=path)
     raise ValueError(
         unknown("driver", text, agent_names()) + "; or the path of a policy"

@@ -9,6 +9,7 @@ import numpy as np
 from marl_airhockey.draws import Draws
 from marl_airhockey.driver import Driver, View
 from marl_airhockey.observer import Observer
+from marl_airhockey.sensor import ALL, Rows
 from marl_airhockey.state import Array, Memory, State
 
 
@@ -63,26 +64,44 @@ class Driven:
         return self.driver.measured()
 
     def act(
-        self, sensed: State, memory: Memory, physics: dict[str, Array], cycles: Array
+        self,
+        sensed: State,
+        memory: Memory,
+        physics: dict[str, Array],
+        cycles: Array,
+        worlds: Rows = ALL,
     ) -> Array:
-        """The asked velocity, (B, 2) fractions in the ego frame."""
-        due = cycles % self.every == 0
+        """The asked velocity in some worlds, (W, 2) fractions in the ego frame."""
+        due, held = cycles[worlds] % self.every == 0, self._held[worlds]
         if not due.any():
-            return self._held
-        view = self.view(sensed, memory, physics)
-        asked, self._memory = self.driver.act(view, self._memory)
-        if asked.shape != self._held.shape or not np.isfinite(asked).all():
+            return held
+        if worlds is not ALL:
+            sensed = sensed.map(lambda x: x[worlds])
+            memory = {name: value[worlds] for name, value in memory.items()}
+            physics = {name: value[worlds] for name, value in physics.items()}
+        view = self.view(sensed, memory, physics, worlds)
+        kept = {name: value[worlds] for name, value in self._memory.items()}
+        asked, kept = self.driver.act(view, kept)
+        if asked.shape != held.shape or not np.isfinite(asked).all():
             raise ValueError(
                 f"driver of paddle_{self.index}: act() must give finite numbers of "
-                f"shape {self._held.shape}, got {asked.shape}"
+                f"shape {held.shape}, got {asked.shape}"
             )
-        self._held = np.where(due[:, None], asked, self._held)
-        return self._held
+        for name, value in kept.items():
+            self._memory[name][worlds] = value
+        self._held[worlds] = np.where(due[:, None], asked, held)
+        return self._held[worlds]
 
-    def view(self, sensed: State, memory: Memory, physics: dict[str, Array]) -> View:
-        """What the driver sees."""
-        seats = np.array([self.index])
-        shown = self._observer.read(sensed, memory, seats, self.driver.observe)
+    def view(
+        self,
+        sensed: State,
+        memory: Memory,
+        physics: dict[str, Array],
+        worlds: Rows = ALL,
+    ) -> View:
+        """What the driver sees in some worlds, all arrays being theirs."""
+        seats, want = np.array([self.index]), self.driver.observe
+        shown = self._observer.read(sensed, memory, seats, want, worlds)
         ego = sensed
         if self._turn[0, 0] != 1.0:
             turned = (x @ self._turn.T for x in (sensed.position, sensed.velocity))
@@ -99,7 +118,7 @@ class Driven:
             labels=self._layout.labels,
             top_speed=physics["paddle_speed"],
             reach=np.asarray(self._seat.reach),
-            draws=self._draws,
+            draws=self._draws.select(worlds),
             seat=self.index,
             recall=memory,
         )

@@ -9,6 +9,7 @@ from typing import Any, Unpack
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
+from marl_airhockey.episode import Step
 from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.observer import Observation
 from marl_airhockey.scenario import GoalScenario, Scenario
@@ -64,21 +65,21 @@ class AirHockeyVecEnv(VecEnv):
     def step_wait(self) -> Any:
         """Move all worlds by one control step."""
         result = self.world.step(self._actions)
-        reward = result.reward.astype(np.float32).reshape(-1)
+        reward = self._pick(result.reward).astype(np.float32)
         self.last_terms = {k: float(v.mean()) for k, v in result.terms.items()}
         self._returns += reward
         self._lengths += 1
         ended = result.terminated | result.truncated
-        done = np.repeat(ended, self.seats)
+        success, done = self._pick(result.success), self._done(ended)
         infos = [self._nothing] * self.num_envs
         if result.final_observation is not None:
             final = self._slots(result.final_observation)
             for i in np.flatnonzero(done).tolist():
-                world, seat = divmod(i, self.seats)
+                world = self._world(i)
                 infos[i] = {
                     "terminal_observation": _row(final, i),
                     "TimeLimit.truncated": bool(result.truncated[world]),
-                    "is_success": bool(result.success[world, seat]),
+                    "is_success": bool(success[i]),
                     "first_shot": bool(result.first_shot[world]),
                     "episode": {
                         "r": float(self._returns[i]),
@@ -87,12 +88,28 @@ class AirHockeyVecEnv(VecEnv):
                     },
                 }
             self._returns[done], self._lengths[done] = 0.0, 0
+            self._restarted(np.flatnonzero(ended), result)
         return self._slots(result.observation), reward, done, infos
 
     def _slots(self, observation: Observation) -> Any:
         if isinstance(observation, np.ndarray):
-            return observation.reshape(self.num_envs, *observation.shape[2:])
-        return {k: v.reshape(self.num_envs, -1) for k, v in observation.items()}
+            return self._pick(observation)
+        return {k: self._pick(v) for k, v in observation.items()}
+
+    def _pick(self, rows: Array) -> Array:
+        """(slots, ...) of (B, seats, ...)."""
+        return rows.reshape(self.num_envs, *rows.shape[2:])
+
+    def _done(self, ended: Array) -> Array:
+        """(slots,) of (B,)."""
+        return np.repeat(ended, self.seats)
+
+    def _world(self, slot: int) -> int:
+        return slot // self.seats
+
+    def _restarted(self, worlds: Array, last: Step) -> None:
+        """Some worlds, by index, have begun anew after their last step."""
+        return None
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
         """(...) float32: 1 where the goal is met; for goals="dict"."""

@@ -72,7 +72,7 @@ class World:
         ]
         n, longest = len(cast.seats), physics.highest("action_delay")
         self._delay = Delay(longest, dt, (b, n, 2)) if longest else None
-        self._seeds = np.zeros(b, np.int64)
+        self.seeds = np.zeros(b, np.int64)
         self._seeded = False
         self.episode = Episode(
             np.zeros(b, np.int64),
@@ -83,13 +83,17 @@ class World:
         )
         self._streams: dict[str, Draws] = {}
         for purpose in ("start", "physics", "sensor", "serve"):
-            self._streams[purpose] = Draws.keyed(self._seeds, self._seeds, purpose)
+            self._streams[purpose] = Draws.keyed(self.seeds, self.seeds, purpose)
         self.state: State = still_state(cast.bodies, b, len(cast.mouths))
         self.memory: Memory = {}
-        self._sensed = self.state
+        self.sensed = self.state
         self._pushed = np.zeros((b, n, 2))
         self.asked, self.sent = np.zeros((2, b, n, 2))
 
+    seeds: Array
+    """(B,) of each world"""
+    sensed: State
+    """What the sensor makes of the state, table frame"""
     asked: Array
     """(B, seats, 2) what was asked in the last step, after its delay: ego fractions"""
     sent: Array
@@ -106,7 +110,7 @@ class World:
 
     def seed(self, seed: int) -> None:
         """Give world i the seed + i; takes effect at the next `reset`."""
-        self._seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
+        self.seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
         self.episode.number[:] = 0
         self._seeded = True
 
@@ -129,7 +133,7 @@ class World:
         episode = self.episode
         episode.number[worlds] += 1
         for purpose, stream in self._streams.items():
-            stream.renew(worlds, self._seeds, episode.number, purpose)
+            stream.renew(worlds, self.seeds, episode.number, purpose)
         if not episode.physics:
             episode.physics = self.physics.draw(self._streams["physics"])
             self.backend.set_physics(episode.physics, np.arange(self.num_worlds))
@@ -146,9 +150,9 @@ class World:
         if self._delay is not None:
             idle = np.zeros((len(worlds), self._delay.depth, *self._pushed.shape[1:]))
             self._delay.fill(worlds, idle)
-        self._sensed = self._look(worlds)
+        self.sensed = self._look(worlds)
         for seat in self.driven:
-            seat.start(worlds, self._seeds, episode.number)
+            seat.start(worlds, self.seeds, episode.number)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put some worlds into rows of a state and a memory."""
@@ -169,7 +173,7 @@ class World:
 
     def observation(self) -> Observation:
         """What the open seats are shown now."""
-        return self.observer.read(self._sensed, self.memory, self.open)
+        return self.observer.read(self.sensed, self.memory, self.open)
 
     def step(self, actions: Array) -> Step:
         """Move all worlds by one control step.
@@ -228,7 +232,7 @@ class World:
             place = seat.measured()
             if place is None:
                 asked[:, seat.index] = seat.act(
-                    self._sensed, self.memory, self.episode.physics, self.episode.cycles
+                    self.sensed, self.memory, self.episode.physics, self.episode.cycles
                 )
                 continue
             if told is None:
@@ -269,7 +273,7 @@ class World:
 
     def _go_on(self, result: Step) -> None:
         """Serve again inside episodes, sense, and restart the worlds that ended."""
-        self._sensed = self._look()
+        self.sensed = self._look()
         served = self.scenario.restart(self._streams["serve"], self.state, self.memory)
         done = result.terminated | result.truncated
         if served is not None:
@@ -279,7 +283,7 @@ class World:
                 worlds, rows = worlds[live], rows.map(lambda x: x[live])
                 memory = {k: v[live] for k, v in memory.items()}
             self._place(worlds, rows, memory)
-            self._sensed = self._look(worlds)
+            self.sensed = self._look(worlds)
         result.observation = self.observation()
         if not self.autoreset:
             return
@@ -291,7 +295,7 @@ class World:
 
     def _renewed(self, observation: Observation, worlds: Array) -> Observation:
         """The observation with that of some worlds read anew."""
-        sensed = self._sensed.map(lambda x: x[worlds])
+        sensed = self.sensed.map(lambda x: x[worlds])
         memory = {k: v[worlds] for k, v in self.memory.items()}
         fresh = self.observer.read(sensed, memory, self.open, worlds=worlds)
         if isinstance(observation, np.ndarray):

@@ -30,7 +30,8 @@ from marl_airhockey.learn.plots import seed_curves
 from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train
 from marl_airhockey.make import Keywords
-from marl_airhockey.match import evaluate, interval
+from marl_airhockey.match import evaluate
+from marl_airhockey.stats import interval
 
 PAPER = {
     "reach": 1.0,

@@ -49,9 +49,9 @@ def test_it_plays_both_ends_alike(agent):
         getattr(flipped, name)[:] = turned[:, [1, 0, 2]]
     everywhere = np.arange(3)
     far._place(everywhere, flipped, far.memory)
-    far._sensed = far._look(everywhere)
+    far.sensed = far._look(everywhere)
     for world, seat in ((near, 0), (far, 1)):
-        world.driven[seat]._draws.renew(everywhere, near._seeds, near._seeds, "same")
+        world.driven[seat]._draws.renew(everywhere, near.seeds, near.seeds, "same")
     for _ in range(40):
         near.step(np.zeros((3, 0, 2)))
         far.step(np.zeros((3, 0, 2)))

@@ -33,7 +33,7 @@ def mirrored(world):
     other = ah.make_world(Pair(), world.num_worlds)
     other.reset(0)
     other._place(np.arange(world.num_worlds), turned, other.memory)
-    other._sensed = other._look(np.arange(world.num_worlds))
+    other.sensed = other._look(np.arange(world.num_worlds))
     return other
 
 
@@ -97,7 +97,7 @@ def place_puck(world, x, y, vx=0.0, vy=0.0):
     rows = world.state.map(np.copy)
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (x, y), (vx, vy)
     world._place(np.arange(world.num_worlds), rows, world.memory)
-    world._sensed = world._look(np.arange(world.num_worlds))
+    world.sensed = world._look(np.arange(world.num_worlds))
 
 
 def idle(world, seconds):
@@ -176,7 +176,7 @@ def test_a_turned_game_gives_turned_rewards(name, backend):
         rows.puck[:, 0] = 0.2 * launch @ matrix.T
         rows.puck_velocity[:, 0] = 2.0 * launch[:, ::-1] @ matrix.T
         world._place(np.arange(count), rows, world.memory)
-        world._sensed = world._look()
+        world.sensed = world._look()
     paid = np.zeros(count, bool)
     for _ in range(30):
         asked = rng.uniform(-1, 1, (count, seats, 2))

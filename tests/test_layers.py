@@ -12,7 +12,17 @@ LAYERS = (
     {"state", "draws", "table"},
     {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
-    | {"symbols", "pool", "versus", "tactics", "loops", "fuse", "threads"},
+    | {
+        "symbols",
+        "pool",
+        "stats",
+        "frozen",
+        "versus",
+        "tactics",
+        "loops",
+        "fuse",
+        "threads",
+    },
     {
         "backends",
         "chipmunk",
@@ -24,10 +34,22 @@ LAYERS = (
         "registry",
         "registration",
     },
-    {"sensor", "observer", "seats", "canvas", "pixels", "render", "window"}
+    {"sensor", "observer", "seats", "roster", "canvas", "pixels", "render", "window"}
     | {"episode", "referee", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
-    {"charts", "match", "bench", "film", "catalogue", "learn", "cli"},
+    {
+        "charts",
+        "match",
+        "contest",
+        "league",
+        "bench",
+        "film",
+        "catalogue",
+        "learn",
+        "cli",
+        "cli_common",
+        "cli_games",
+    },
 )
 PURE = sorted(LAYERS[0] | LAYERS[1])
 EXTRAS = [

@@ -18,7 +18,8 @@ import marl_airhockey as ah
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
 from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train
-from marl_airhockey.match import Deployability, evaluate, interval
+from marl_airhockey.match import Deployability, evaluate
+from marl_airhockey.stats import interval
 
 SMALL = {
     "total_steps": 16_384,

@@ -135,7 +135,7 @@ def test_occlusion_holds_what_was_seen():
     hidden = []
     for _ in range(30):
         world.step(np.zeros((64, 1, 2)))
-        hidden.append(~world._sensed.visible[:, 0])
+        hidden.append(~world.sensed.visible[:, 0])
         held = world.sensor.history[hidden[-1], -1, 0, :2]
         before = world.sensor.history[hidden[-1], -2, 0, :2]
         np.testing.assert_array_equal(held, before)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from marl_airhockey.make import Keywords
 from marl_airhockey.physics import unknown
-from marl_airhockey.registry import scenario_names
+from marl_airhockey.registry import make_scenario, scenario_names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,21 @@ class TrainConfig:
     eval_episodes: int
     torch_threads: int = 1
 
+    mirror: float
+    """In games: share of the worlds in which the learner plays all seats."""
+    opponents: list[str]
+    """In games: drivers that it meets in training."""
+    script_share: float
+    """In games: share of the other worlds' games that are against these."""
+    snapshots: int
+    """In games: how often the learner is taken into the pool of opponents."""
+    pool: int
+    """In games: most snapshots in the pool."""
+    priority: float
+    """In games: an opponent is drawn by its share of won games to this power."""
+    rivals: list[str]
+    """In games: drivers that evaluations are against."""
+
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
@@ -65,18 +81,40 @@ class TrainConfig:
                 raise ValueError(f"{f.name}: expected a number, got {value!r}")
             if f.type == "int" and int(value) != value:
                 raise ValueError(f"{f.name}: expected a whole number, got {value!r}")
-            free = ("seed", "ent_coef", "log_std_init")
+            free = ("seed", "ent_coef", "log_std_init", "mirror", "script_share")
             if number and f.name not in free and value <= 0:
                 raise ValueError(f"{f.name}: {value} must be above 0")
         if not self.hidden or any(w < 1 for w in self.hidden):
             raise ValueError(f"hidden: {self.hidden} must be widths above 0")
 
-        rollout = self.n_steps * self.num_worlds
+        for name in ("mirror", "script_share"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
+        rollout = self.n_steps * self.slots
         if rollout % self.batch_size:
             raise ValueError(
-                f"batch_size: {self.batch_size} must divide n_steps x num_worlds, "
-                f"{rollout}"
+                f"batch_size: {self.batch_size} must divide n_steps x learners in "
+                f"num_worlds worlds, {rollout}"
             )
+
+    @cached_property
+    def self_play(self) -> bool:
+        """Whether seats of more than one team are open: the learner plays them all."""
+        return len(set(self._open_teams)) > 1
+
+    @cached_property
+    def _open_teams(self) -> list[int]:
+        seats = enumerate(make_scenario(self.scenario, **self.options).cast.seats)
+        return [s.team for i, s in seats if f"paddle_{i}" not in self.drivers]
+
+    @property
+    def slots(self) -> int:
+        """Seats that the learner plays, over all worlds."""
+        seats, teams = len(self._open_teams), len(set(self._open_teams))
+        if teams == 1:
+            return self.num_worlds * seats
+        mirrored = round(self.mirror * self.num_worlds)
+        return mirrored * seats + (self.num_worlds - mirrored) * (seats // teams)
 
     @property
     def keywords(self) -> Keywords:

@@ -10,26 +10,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
+from marl_airhockey.frozen import Frozen
+from marl_airhockey.learn.arena import Arena
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.policy import Policy
-from marl_airhockey.match import Result, evaluate
+from marl_airhockey.learn.judge import judge
+from marl_airhockey.learn.network import freeze
 from marl_airhockey.vector_sb3 import AirHockeyVecEnv
 
-EVAL_SEED = 1_000_000
-"""First seed of the evaluations during training."""
-COLUMNS = (
-    "steps",
-    "cpu_seconds",
-    "wall_seconds",
-    "success",
-    "success_sampled",
-    "first_shot",
-    "return",
-    "length",
-    "hits",
-)
 Report = Callable[[int, int, dict[str, float]], None]
 """Called with steps done, steps in all, and the newest evaluation."""
 
@@ -98,14 +88,29 @@ class Keeper(BaseCallback):
         self.rate, self.report = rate, report
         self._every = max(config.total_steps // config.evaluations, 1)
         self._next = (progress.steps // self._every + 1) * self._every
+        # The first one at once: there must be somebody to play against.
+        self._due = progress.steps
         self._row: dict[str, float] = {}
         self._clock = (time.process_time(), time.perf_counter())
+
+    def _freeze(self) -> Frozen:
+        """The policy as it is."""
+        assert isinstance(self.model, PPO)
+        return freeze(self.model, self.card)
+
+    @property
+    def card(self) -> dict[str, Any]:
+        """What the policy is, as saved with it."""
+        return {**vars(self.model)["card"], "steps": self.num_timesteps}
 
     def _on_step(self) -> bool:
         env = self.training_env
         assert isinstance(env, AirHockeyVecEnv)
         for name, value in env.last_terms.items():
             self.logger.record_mean(f"reward/{name}", value)
+        if isinstance(env, Arena):
+            for name, value in env.scores.items():
+                self.logger.record(f"score/{name}", value)
         return True
 
     def _on_rollout_start(self) -> None:
@@ -116,6 +121,10 @@ class Keeper(BaseCallback):
         if self.num_timesteps >= self._next:
             self.checkpoint()
             self._next += self._every
+        env = self.training_env
+        if isinstance(env, Arena) and self.num_timesteps >= self._due:
+            env.snapshot(self._freeze(), self.num_timesteps)
+            self._due += self.config.total_steps // self.config.snapshots
         if self.report is not None:
             self.report(self.num_timesteps, self.config.total_steps, self._row)
 
@@ -132,34 +141,33 @@ class Keeper(BaseCallback):
         The time of evaluations does not count as training.
         """
         self._account()
-        mean = evaluate_model(self.model, self.config, True)
-        sampled = evaluate_model(self.model, self.config, False)
-        values = (
-            self.progress.steps,
-            self.progress.cpu_seconds,
-            self.progress.wall_seconds,
-            mean.success,
-            sampled.success,
-            mean.first_shot,
-            mean.returns,
-            mean.length,
-            mean.hits,
-        )
-        self._row = dict(zip(COLUMNS, values, strict=True))
-        for name in COLUMNS[3:]:
-            self.logger.record(f"eval/{name}", self._row[name])
+        grades = judge(self.model, self.config)
+        progress = self.progress
+        clock = {
+            "steps": progress.steps,
+            "cpu_seconds": progress.cpu_seconds,
+            "wall_seconds": progress.wall_seconds,
+        }
+        self._row = {**clock, **grades}
+        for name, value in grades.items():
+            self.logger.record(f"eval/{name}", value)
         table = self.folder / "evaluations.csv"
         fresh = not table.exists()
         with table.open("a", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS)
+            writer = csv.DictWriter(file, list(self._row))
             if fresh:
                 writer.writeheader()
             writer.writerow(self._row)
-        score = (mean.success, mean.returns)
-        if score > tuple(self.progress.best):
-            self.progress.best = score
+        score = (next(iter(grades.values())), grades["return"])
+        if score > tuple(progress.best):
+            progress.best = score
             _save(self.model, self.folder / "best.zip")
         _save(self.model, self.folder / "last.zip")
+        if self.config.self_play:
+            past = self.folder / "milestones"
+            past.mkdir(exist_ok=True)
+            name = f"{progress.steps:012d}.npz"
+            self._freeze().save(past / name)
         self.progress.save(self.folder / "state.json")
         self._clock = (time.process_time(), time.perf_counter())
         return self._row
@@ -169,21 +177,3 @@ def _save(model: Any, path: Path) -> None:
     draft = path.with_name(f"part-{path.name}")
     model.save(draft)
     draft.replace(path)
-
-
-def evaluate_model(model: Any, config: TrainConfig, deterministic: bool) -> Result:
-    """Evaluate a model in training on the evaluation seeds."""
-
-    def predict(observation: Any, mean: bool) -> Any:
-        return model.predict(observation, deterministic=mean)[0]
-
-    shape = model.observation_space.shape
-    policy = Policy(predict, shape, config.observe, "training", deterministic)
-    return evaluate(
-        policy,
-        "training",
-        config.scenario,
-        config.eval_episodes,
-        EVAL_SEED,
-        config.keywords,
-    )

@@ -1,12 +1,17 @@
-"""The fixed input scaling of policies: no running statistics, nothing to lose."""
+"""The networks of policies: their fixed input scaling, and how they are frozen."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import torch
 from gymnasium import spaces
+from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+
+from marl_airhockey.frozen import Frozen
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -40,3 +45,28 @@ class FixedScale(BaseFeaturesExtractor):
         flat = (observations["observation"] - self.centre) * self.rate
         goals = [observations["achieved_goal"], observations["desired_goal"]]
         return torch.cat([flat, *goals], dim=-1)
+
+
+def freeze(model: PPO, card: Mapping[str, Any]) -> Frozen:
+    """The actor of a model that `train.build` made, as plain arrays.
+
+    Raises:
+        ValueError: another kind of model: pixels, dict goals, other layers.
+    """
+    policy: Any = model.policy
+    scale, layers = policy.features_extractor, policy.mlp_extractor.policy_net
+    kinds = {type(layer) for layer in layers}
+    if not isinstance(scale, FixedScale) or kinds - {torch.nn.Linear, torch.nn.ReLU}:
+        raise ValueError("freeze: only policies on flat observations with ReLU layers")
+    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
+
+    def array(tensor: torch.Tensor) -> Any:
+        return tensor.detach().cpu().numpy().astype(np.float32).copy()
+
+    return Frozen(
+        [(array(x.weight), array(x.bias)) for x in [*linear, policy.action_net]],
+        array(scale.centre),
+        array(1.0 / scale.rate),
+        array(policy.log_std),
+        card,
+    )

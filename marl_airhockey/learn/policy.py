@@ -1,4 +1,4 @@
-"""Policies from files: what `train` saved, any SB3 zip, any ONNX file that fits."""
+"""Policies from files: what `train` saved, any SB3 zip, ONNX and frozen ones."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from marl_airhockey.driver import Driver, View
 from marl_airhockey.extras import need
+from marl_airhockey.frozen import Frozen
 from marl_airhockey.state import Array
 
 Predict = Callable[[Any, bool], Array]
@@ -35,6 +36,8 @@ class Policy(Driver):
     observe: str | None = None
     source: str = "policy"
     deterministic: bool = True
+    noise: Array | None = None
+    """(2,) deviation of sampled actions, if `predict` gives means alone."""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -47,11 +50,13 @@ class Policy(Driver):
                 "scenario, or with other options (observe, goals, seats)"
             )
         asked = np.asarray(self.predict(seen, self.deterministic), np.float64)
+        if self.noise is not None and not self.deterministic:
+            asked += self.noise * view.draws.normal(2)
         return np.clip(asked, -1.0, 1.0), memory
 
 
 def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
-    """Load a policy: a run folder of `train`, an SB3 .zip, or an .onnx file.
+    """Load a policy: a run folder of `train`, an SB3 .zip, an .onnx or a frozen .npz.
 
     An SB3 zip holds pickled Python: load only files that you trust.
 
@@ -65,12 +70,27 @@ def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
         path = best if best.exists() else path / "last.zip"
     if not path.exists():
         raise ValueError(f"{path}: there is no such policy file")
+    if path.suffix == ".npz":
+        return frozen_policy(Frozen.load(path), str(path), deterministic)
     if path.suffix == ".onnx":
         return _load_onnx(path, deterministic)
     if path.suffix == ".zip":
         return _load_sb3(path, deterministic)
     raise ValueError(
-        f"{path}: expected a run folder, a stable-baselines3 .zip or an .onnx file"
+        f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file or a "
+        "frozen .npz"
+    )
+
+
+def frozen_policy(frozen: Frozen, source: str, deterministic: bool = True) -> Policy:
+    """A frozen network as a driver."""
+    return Policy(
+        lambda observation, _: frozen(observation),
+        frozen.centre.shape,
+        frozen.card.get("observe"),
+        source,
+        deterministic,
+        np.exp(frozen.log_std),
     )
 
 

@@ -22,6 +22,7 @@ from stable_baselines3.common.logger import (
     TensorBoardOutputFormat,
 )
 
+from marl_airhockey.learn.arena import Arena
 from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.keeper import Keeper, Progress, Rate, Report
 from marl_airhockey.learn.network import FixedScale
@@ -63,7 +64,7 @@ def train(
     torch.set_num_threads(config.torch_threads)
     torch.set_flush_denormal(True)
     rate = Rate(config, progress.rate or config.learning_rate)
-    env = make_sb3_vec(config.scenario, config.num_worlds, **config.keywords)
+    env = environment(config, folder)
     if resumed and (folder / "last.zip").exists():
         model = PPO.load(folder / "last.zip", env, device="cpu")
         model.learning_rate = model.lr_schedule = rate
@@ -79,6 +80,24 @@ def train(
     model.logger.close()
     env.close()
     return row
+
+
+def environment(config: TrainConfig, folder: Path) -> AirHockeyVecEnv:
+    """The worlds that a configuration is trained in."""
+    if not config.self_play:
+        return make_sb3_vec(config.scenario, config.num_worlds, **config.keywords)
+    return Arena(
+        config.scenario,
+        config.num_worlds,
+        config.keywords,
+        config.opponents,
+        config.mirror,
+        config.script_share,
+        config.priority,
+        config.pool,
+        folder / "pool",
+        config.seed,
+    )
 
 
 def _logger(folder: Path, steps: int) -> Logger:

@@ -1,0 +1,112 @@
+"""Commands for games: ``airhockey league``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli_common import (
+    AsJson,
+    Backend,
+    Options,
+    Profile,
+    bar,
+    console,
+    environment,
+)
+from marl_airhockey.extras import need
+from marl_airhockey.league import Standings, found_in
+from marl_airhockey.league import league as play_league
+from marl_airhockey.registry import make_driver
+
+SCRIPTS = (
+    "random",
+    *(
+        f"{script}:strength={strength}"
+        for script in ("goalkeeper", "striker", "allround")
+        for strength in ("weak", "fair", "strong")
+    ),
+)
+
+
+def league(
+    scenario: Annotated[str, typer.Argument(help="A game of two teams.")],
+    players: Annotated[
+        list[str] | None,
+        typer.Argument(help="Drivers and policies; all scripts if none are given."),
+    ] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="Every policy and run in it plays, too.")
+    ] = None,
+    games: Annotated[int, typer.Option(help="Of each pair.")] = 100,
+    out: Annotated[Path, typer.Option(help="Folder of table and picture.")] = Path(
+        "runs/league"
+    ),
+    backend: Backend = "batched",
+    profile: Profile = "ideal",
+    option: Options = None,
+    exploit: Annotated[
+        int | None,
+        typer.Option(help="Train a best response to each policy for so many steps."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Let everybody play everybody: ratings, matrix, circles."""
+    names = list(players or ([] if folder else SCRIPTS))
+    names += found_in(folder) if folder else []
+    keywords = environment(backend, profile, option, None)
+    entrants = {name: make_driver(name) for name in names}
+    standings = play_league(scenario, entrants, games, keywords=keywords)
+    files = standings.save(out)
+    responses = best_responses(scenario, names, exploit, out) if exploit else {}
+    if responses:
+        (out / "exploitability.json").write_text(json.dumps(responses, indent=1))
+    if as_json:
+        report = {**standings.to_json(), "best_responses": responses}
+        console.print_json(json.dumps(report))
+        return
+    console.print(table(standings))
+    for circle in standings.circles:
+        console.print("circle:", " > ".join((*circle, circle[0])))
+    for name, score in responses.items():
+        console.print(f"best response to {name} after {exploit:,} steps: {score:.3f}")
+    console.print("files:", *files)
+
+
+def best_responses(
+    scenario: str, names: list[str], steps: int, out: Path
+) -> dict[str, float]:
+    """The score of what learned to beat each player, in as many steps."""
+    need("stable_baselines3", "train")
+    from marl_airhockey.learn.exploit import best_response
+
+    found = {}
+    with bar() as progress:
+        task = progress.add_task("best responses", total=len(names), note="")
+        for number, name in enumerate(names):
+            progress.update(task, note=name)
+            run = out / "responses" / f"{number}-{steps}"
+            found[name] = best_response(scenario, name, steps, run)
+            progress.advance(task)
+    return found
+
+
+def table(standings: Standings) -> Table:
+    """The league, the best first."""
+    shown = Table("player", "Elo", "95 %", "score", "won", "drawn", "lost", "goals")
+    for row in standings.rows():
+        shown.add_row(
+            row["player"],
+            f"{row['elo']:.0f}",
+            f"{row['elo_low']:.0f}..{row['elo_high']:.0f}",
+            f"{row['score']:.3f}",
+            f"{row['wins']}",
+            f"{row['draws']}",
+            f"{row['losses']}",
+            f"{row['goal_difference']:+.2f}",
+        )
+    return shown

@@ -1,0 +1,84 @@
+"""Games between players: who wins, by how much, over many games in one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.driver import Driver
+from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.roster import Roster
+from marl_airhockey.state import Array
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """How G games of T teams went."""
+
+    won: Array
+    """(G, T) bool; nobody in a draw"""
+    margin: Array
+    """(G, T) return of a team's seats: goals for less goals against"""
+    seconds: Array
+    """(G,) how long it took"""
+
+    @property
+    def score(self) -> Array:
+        """(G, T) 1 for a win, an equal share of 1 for a draw."""
+        drawn = ~self.won.any(-1, keepdims=True)
+        return np.asarray(self.won + drawn / self.won.shape[1])
+
+
+def teams_of(seats: Sequence[int]) -> Array:
+    """(seats,) the number of each seat's team, from 0."""
+    return np.unique(np.asarray(seats), return_inverse=True)[1]
+
+
+def play(
+    scenario: str,
+    players: Sequence[Driver],
+    lineups: Array,
+    seed: int,
+    keywords: Keywords | None = None,
+) -> Outcomes:
+    """Play games, all at once, to their ends.
+
+    Args:
+        scenario: a game.
+        players: drivers.
+        lineups: (G, T) which player plays for which team in each game, by number.
+        seed: of the first game; game i has seed + i.
+        keywords: of the environment, see `make.build_world`.
+
+    Raises:
+        ValueError: a scenario without teams that play each other.
+    """
+    games = len(lineups)
+    world = build_world(scenario, games, autoreset=False, keywords=keywords or {})
+    teams = teams_of([seat.team for seat in world.cast.seats])
+    if teams.max() == 0:
+        raise ValueError(f"{scenario!r} has no teams that play against each other")
+    if lineups.shape != (games, teams.max() + 1):
+        raise ValueError(f"{scenario!r} is played by {teams.max() + 1} teams")
+    roster = Roster(world)
+    for number, player in enumerate(players):
+        roster.add(f"player {number}", player)
+    roster.seated[:] = np.asarray(lineups)[:, teams]
+    world.reset(seed)
+    roster.begin(np.arange(games))
+    first = [int(np.flatnonzero(teams == team)[0]) for team in range(teams.max() + 1)]
+    won, margin = np.zeros(lineups.shape, np.bool_), np.zeros(lineups.shape)
+    seconds, playing = np.zeros(games), np.ones(games, np.bool_)
+    actions = np.zeros((games, len(teams), 2))
+    while playing.any():
+        roster.ask(actions)
+        step = world.step(actions)
+        ended = playing & (step.terminated | step.truncated)
+        won[ended] = world.episode.success[ended][:, first]
+        margin[ended] = world.episode.returns[ended][:, first]
+        seconds[ended] = world.state.time[ended]
+        playing &= ~ended
+    world.close()
+    return Outcomes(won, margin, seconds)

@@ -1,0 +1,76 @@
+"""How good a policy in training is: success at a task, scores against rivals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contest import play, teams_of
+from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.policy import Policy
+from marl_airhockey.make import Keywords
+from marl_airhockey.match import Result, evaluate
+from marl_airhockey.registry import make_driver, make_scenario
+
+EVAL_SEED = 1_000_000
+"""First seed of the evaluations during training."""
+Grades = dict[str, float]
+"""Named numbers; the first says how good the policy is, ``return`` breaks ties."""
+
+
+def judge(model: Any, config: TrainConfig) -> Grades:
+    """Grade a model in training on the evaluation seeds."""
+    return _scores(model, config) if config.self_play else _success(model, config)
+
+
+def _success(model: Any, config: TrainConfig) -> Grades:
+    mean = evaluate_model(model, config, True)
+    return {
+        "success": mean.success,
+        "success_sampled": evaluate_model(model, config, False).success,
+        "first_shot": mean.first_shot,
+        "return": mean.returns,
+        "length": mean.length,
+        "hits": mean.hits,
+    }
+
+
+def _scores(model: Any, config: TrainConfig) -> Grades:
+    """The share of won games, half the draws, against rivals; ends change by turns."""
+    players = [_driver(model, config, True), *map(make_driver, config.rivals)]
+    cast = make_scenario(config.scenario, **config.options).cast
+    teams = int(teams_of([seat.team for seat in cast.seats]).max()) + 1
+    games = config.eval_episodes
+    rows = np.arange(1, len(players)).repeat(games)
+    seats = rows[:, None].repeat(teams, axis=1)
+    seats[np.arange(len(rows)), np.arange(len(rows)) % teams] = 0
+    keywords: Keywords = {**config.keywords, "drivers": {}}
+    found = play(config.scenario, players, seats, EVAL_SEED, keywords)
+    mine = seats == 0
+    score = found.score[mine].reshape(-1, games).mean(-1)
+    margin = found.margin[mine].reshape(-1, games).mean(-1)
+    grades = {"score": float(score.mean()), "return": float(margin.mean())}
+    for rival, share in zip(config.rivals, score.tolist(), strict=True):
+        grades[f"score/{rival}"] = share
+    return grades
+
+
+def _driver(model: Any, config: TrainConfig, deterministic: bool) -> Policy:
+    def predict(observation: Any, mean: bool) -> Any:
+        return model.predict(observation, deterministic=mean)[0]
+
+    shape = model.observation_space.shape
+    return Policy(predict, shape, config.observe, "training", deterministic)
+
+
+def evaluate_model(model: Any, config: TrainConfig, deterministic: bool) -> Result:
+    """Evaluate a model in training on the evaluation seeds."""
+    return evaluate(
+        _driver(model, config, deterministic),
+        "training",
+        config.scenario,
+        config.eval_episodes,
+        EVAL_SEED,
+        config.keywords,
+    )
