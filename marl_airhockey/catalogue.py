@@ -15,6 +15,7 @@ from marl_airhockey.registry import (
     gymnasium_id,
     make_scenario,
     scenario_names,
+    zoo_names,
 )
 from marl_airhockey.scenario import Scenario
 
@@ -39,7 +40,12 @@ def summary() -> dict[str, Any]:
                 "id": gymnasium_id(name),
             }
         )
-    return {"scenarios": rows, "drivers": agent_names(), "backends": backend_names()}
+    return {
+        "scenarios": rows,
+        "drivers": agent_names(),
+        "zoo": zoo_names(),
+        "backends": backend_names(),
+    }
 
 
 def describe(name: str) -> dict[str, Any]:

@@ -53,6 +53,7 @@ def list_scenarios(
             table.add_row(*(str(row[k]) for k in ("name", "what", "seats", "seconds")))
         console.print(table)
         console.print("drivers: ", ", ".join(data["drivers"]))
+        console.print("zoo:     ", ", ".join(data["zoo"]))
         console.print("backends:", ", ".join(data["backends"]))
         return
     data = describe(scenario)
@@ -128,6 +129,19 @@ def train(
     )
     name = scenario or "SCENARIO"
     console.print(f"next: airhockey evaluate {folder} --scenario {name}")
+
+
+@app.command()
+def export(
+    run: Annotated[Path, typer.Argument(help="Folder of a training run.")],
+    out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
+) -> None:
+    """Freeze a trained policy into one small file with a card, measured anew."""
+    need("stable_baselines3", "train")
+    from marl_airhockey.learn.export import export as freeze
+
+    console.print_json(json.dumps(dict(freeze(run, out).card)))
+    console.print(f"{out}: {out.stat().st_size / 1000:.0f} kB")
 
 
 @app.command("evaluate")

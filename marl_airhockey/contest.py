@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from marl_airhockey.driver import Driver
-from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.make import Keywords, build_world, find_scenario
 from marl_airhockey.roster import Roster
 from marl_airhockey.state import Array
 
@@ -34,6 +34,38 @@ class Outcomes:
 def teams_of(seats: Sequence[int]) -> Array:
     """(seats,) the number of each seat's team, from 0."""
     return np.unique(np.asarray(seats), return_inverse=True)[1]
+
+
+def challenge(
+    scenario: str,
+    player: Driver,
+    rivals: Sequence[Driver],
+    games: int,
+    seed: int,
+    keywords: Keywords | None = None,
+) -> tuple[Array, Array]:
+    """One player against each of others, who play for all other teams.
+
+    Args:
+        scenario: a game.
+        player: it changes ends from game to game.
+        rivals: drivers.
+        games: against each.
+        seed: of the first game.
+        keywords: of the environment.
+
+    Returns:
+        Its score and its mean margin against each rival, (R,).
+    """
+    keywords = keywords or {}
+    cast = find_scenario(scenario, keywords).cast
+    teams = int(teams_of([seat.team for seat in cast.seats]).max()) + 1
+    rows = np.arange(1, len(rivals) + 1).repeat(games)
+    lineups = rows[:, None].repeat(teams, axis=1)
+    lineups[np.arange(len(rows)), np.arange(len(rows)) % teams] = 0
+    found = play(scenario, [player, *rivals], lineups, seed, keywords)
+    score, margin = found.score[lineups == 0], found.margin[lineups == 0]
+    return score.reshape(-1, games).mean(-1), margin.reshape(-1, games).mean(-1)
 
 
 def play(

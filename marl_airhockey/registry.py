@@ -16,6 +16,8 @@ from marl_airhockey.driver import Driver
 from marl_airhockey.physics import unknown
 from marl_airhockey.scenario import Scenario
 
+ZOO = Path(__file__).parent / "zoo"
+
 
 def _names(folder: str) -> list[str]:
     package = importlib.import_module(f"marl_airhockey.{folder}")
@@ -62,12 +64,21 @@ def make_scenario(name: str, **options: Any) -> Scenario:
     return cast(Scenario, _build(f"option of {name}", module.make, options, known))
 
 
+def zoo_names() -> list[str]:
+    """Names of the trained policies that come with the library."""
+    return sorted(f"zoo/{path.stem}" for path in ZOO.glob("*.npz"))
+
+
 def make_agent(name: str, **options: Any) -> Driver:
-    """Build what ``agents/<name>.py`` makes.
+    """Build what ``agents/<name>.py`` makes, or a trained policy: ``zoo/duel``.
 
     Raises:
         ValueError: an unknown name or option.
     """
+    if name.startswith("zoo/"):
+        if name not in zoo_names():
+            raise ValueError(unknown("policy of the zoo", name, zoo_names()))
+        return make_agent("policy", path=ZOO / f"{name[4:]}.npz", **options)
     module = _load("driver", "agents", name, agent_names())
     known = list(inspect.signature(module.make).parameters)
     return cast(Driver, _build(f"option of {name}", module.make, options, known))
@@ -82,7 +93,7 @@ def make_driver(text: str | Path) -> Driver:
         ValueError: neither the one nor the other, or a bad option.
     """
     path, (name, _, options) = Path(text), str(text).partition(":")
-    if name in agent_names():
+    if name in agent_names() or name.startswith("zoo/"):
         return make_agent(
             name, **dict(_option(part) for part in options.split(",") if part)
         )

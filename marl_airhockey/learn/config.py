@@ -14,6 +14,9 @@ from marl_airhockey.make import Keywords
 from marl_airhockey.physics import unknown
 from marl_airhockey.registry import make_scenario, scenario_names
 
+OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
+RIVALS = ("random", "goalkeeper:strength=fair", "striker", "allround")
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig:
@@ -58,19 +61,19 @@ class TrainConfig:
     eval_episodes: int
     torch_threads: int = 1
 
-    mirror: float
+    mirror: float = 0.5
     """In games: share of the worlds in which the learner plays all seats."""
-    opponents: list[str]
+    opponents: list[str] = field(default_factory=lambda: list(OPPONENTS))
     """In games: drivers that it meets in training."""
-    script_share: float
+    script_share: float = 0.5
     """In games: share of the other worlds' games that are against these."""
-    snapshots: int
+    snapshots: int = 40
     """In games: how often the learner is taken into the pool of opponents."""
-    pool: int
+    pool: int = 16
     """In games: most snapshots in the pool."""
-    priority: float
+    priority: float = 2.0
     """In games: an opponent is drawn by its share of won games to this power."""
-    rivals: list[str]
+    rivals: list[str] = field(default_factory=lambda: list(RIVALS))
     """In games: drivers that evaluations are against."""
 
     def __post_init__(self) -> None:
@@ -87,6 +90,11 @@ class TrainConfig:
         if not self.hidden or any(w < 1 for w in self.hidden):
             raise ValueError(f"hidden: {self.hidden} must be widths above 0")
 
+        if self.drivers and self.self_play:
+            raise ValueError(
+                f"drivers: self-play needs all seats of {self.scenario!r} open; to "
+                "learn against somebody, fill all seats of the other teams"
+            )
         for name in ("mirror", "script_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")

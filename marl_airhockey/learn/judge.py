@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from marl_airhockey.contest import play, teams_of
+from marl_airhockey.contest import challenge
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.policy import Policy
 from marl_airhockey.make import Keywords
 from marl_airhockey.match import Result, evaluate
-from marl_airhockey.registry import make_driver, make_scenario
+from marl_airhockey.registry import make_driver
 
 EVAL_SEED = 1_000_000
 """First seed of the evaluations during training."""
@@ -38,18 +36,15 @@ def _success(model: Any, config: TrainConfig) -> Grades:
 
 def _scores(model: Any, config: TrainConfig) -> Grades:
     """The share of won games, half the draws, against rivals; ends change by turns."""
-    players = [_driver(model, config, True), *map(make_driver, config.rivals)]
-    cast = make_scenario(config.scenario, **config.options).cast
-    teams = int(teams_of([seat.team for seat in cast.seats]).max()) + 1
-    games = config.eval_episodes
-    rows = np.arange(1, len(players)).repeat(games)
-    seats = rows[:, None].repeat(teams, axis=1)
-    seats[np.arange(len(rows)), np.arange(len(rows)) % teams] = 0
     keywords: Keywords = {**config.keywords, "drivers": {}}
-    found = play(config.scenario, players, seats, EVAL_SEED, keywords)
-    mine = seats == 0
-    score = found.score[mine].reshape(-1, games).mean(-1)
-    margin = found.margin[mine].reshape(-1, games).mean(-1)
+    score, margin = challenge(
+        config.scenario,
+        _driver(model, config, True),
+        [make_driver(rival) for rival in config.rivals],
+        config.eval_episodes,
+        EVAL_SEED,
+        keywords,
+    )
     grades = {"score": float(score.mean()), "return": float(margin.mean())}
     for rival, share in zip(config.rivals, score.tolist(), strict=True):
         grades[f"score/{rival}"] = share

@@ -1,0 +1,102 @@
+"""From a run to one small file with a card: how it came about and how good it is."""
+
+from __future__ import annotations
+
+import datetime
+import shlex
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from stable_baselines3 import PPO
+
+from marl_airhockey.contest import challenge
+from marl_airhockey.frozen import Frozen
+from marl_airhockey.learn.config import TrainConfig, load_config, preset
+from marl_airhockey.learn.keeper import Progress
+from marl_airhockey.learn.network import freeze
+from marl_airhockey.learn.policy import Policy, frozen_policy
+from marl_airhockey.match import TEST_SEED, evaluate
+from marl_airhockey.registry import make_driver, make_scenario
+from marl_airhockey.stats import interval
+
+EPISODES = 1000
+GAMES = 200
+
+
+def export(run: Path, out: Path) -> Frozen:
+    """Freeze the last policy of a run and measure it on seeds that it has not seen.
+
+    Args:
+        run: folder of `train`.
+        out: the .npz to write.
+
+    Raises:
+        ValueError: no run, or a policy that cannot be frozen.
+    """
+    config = load_config(run / "config.toml")
+    if not (run / "last.zip").exists():
+        raise ValueError(f"{run}: there is no last.zip in it; train it first")
+    progress = Progress.load(run / "state.json")
+    model = PPO.load(run / "last.zip", device="cpu")
+    bare = freeze(model, vars(model)["card"])
+    policy = frozen_policy(bare, str(run))
+    grades = _games(policy, config) if config.self_play else _episodes(policy, config)
+    card = {
+        **bare.card,
+        "version": make_scenario(config.scenario).version,
+        "options": config.options,
+        "profile": config.profile,
+        "command": command(config),
+        "seed": config.seed,
+        "steps": progress.steps,
+        "cpu_minutes": round(progress.cpu_seconds / 60, 2),
+        "date": datetime.date.today().isoformat(),
+        "grades": grades,
+    }
+    frozen = Frozen(bare.layers, bare.centre, bare.unit, bare.log_std, card)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    frozen.save(out)
+    return frozen
+
+
+def _episodes(policy: Policy, config: TrainConfig) -> dict[str, Any]:
+    found = evaluate(
+        policy, "frozen", config.scenario, EPISODES, TEST_SEED, config.keywords
+    )
+    low, high = found.success_interval
+    return {"success": found.success, "low": low, "high": high, "episodes": EPISODES}
+
+
+def _games(policy: Policy, config: TrainConfig) -> dict[str, Any]:
+    score, _ = challenge(
+        config.scenario,
+        policy,
+        [make_driver(rival) for rival in config.rivals],
+        GAMES,
+        TEST_SEED,
+        {**config.keywords, "drivers": {}},
+    )
+    return {
+        "games_of_each": GAMES,
+        "score": {
+            rival: [share, *interval(share, GAMES)]
+            for rival, share in zip(config.rivals, score.tolist(), strict=True)
+        },
+    }
+
+
+def command(config: TrainConfig) -> str:
+    """The line that trains a configuration anew."""
+    usual = preset(config.scenario, {"profile": config.profile, "seed": config.seed})
+    words = [f"airhockey train {config.scenario} --seed {config.seed}"]
+    if config.profile != "ideal":
+        words.append(f"--profile {config.profile}")
+    words += [f"--option {k}={v}" for k, v in config.options.items()]
+    words += [f"--driver {k}={v}" for k, v in config.drivers.items()]
+    own = ("scenario", "profile", "options", "drivers", "seed")
+    for f in fields(config):
+        value = getattr(config, f.name)
+        if f.name not in own and value != getattr(usual, f.name):
+            words.append("--set " + shlex.quote(f"{f.name}={value}".replace(" ", "")))
+    return " ".join(words)

@@ -1,0 +1,57 @@
+"""The trained policies that come with the library do what their cards say."""
+
+import subprocess
+import sys
+
+import pytest
+
+import marl_airhockey as ah
+from marl_airhockey.contest import challenge
+from marl_airhockey.frozen import Frozen
+from marl_airhockey.match import evaluate
+from marl_airhockey.registry import ZOO, make_driver, zoo_names
+
+
+@pytest.mark.parametrize("name", zoo_names())
+def test_it_is_small_and_as_good_as_its_card(name):
+    path = ZOO / f"{name[4:]}.npz"
+    assert path.stat().st_size < 300_000
+    card = Frozen.load(path).card
+    assert card["version"] == ah.make_scenario(card["scenario"]).version
+    assert card["command"].startswith(f"airhockey train {card['scenario']} --seed")
+    assert card["date"] >= "2026-11-21"
+    grades = card["grades"]
+    options = {"backend": "batched", "profile": card["profile"]}
+    options["options"] = card["options"]
+    if "success" in grades:
+        driver = ah.make_agent(name)
+        found = evaluate(driver, name, card["scenario"], 200, 7, options)
+        _, high = found.success_interval
+        assert high >= grades["low"]
+        return
+    for rival, (_, low, _) in grades["score"].items():
+        rivals = [make_driver(rival)]
+        driver = ah.make_agent(name)
+        score, _ = challenge(card["scenario"], driver, rivals, 40, 7, options)
+        assert score[0] >= low - 0.2
+
+
+def test_every_task_has_one():
+    tasks = {n for n in ah.scenario_names() if len(ah.make_scenario(n).cast.seats) == 1}
+    assert {f"zoo/{task}" for task in tasks} <= set(zoo_names())
+
+
+def test_it_plays_without_a_deep_learning_library():
+    code = (
+        "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
+        "import marl_airhockey as ah\n"
+        "env = ah.parallel_env('rally', drivers={'paddle_1': 'zoo/rally'})\n"
+        "seen, _ = env.reset(seed=0)\n"
+        "env.step({'paddle_0': [0.0, 0.0]})\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_an_unknown_policy_is_named():
+    with pytest.raises(ValueError, match=r"unknown policy of the zoo 'zoo/dule'"):
+        ah.make_agent("zoo/dule")
