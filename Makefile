@@ -17,7 +17,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,dev]'
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,ecosystem,dev]'
 	touch $@
 
 demo: setup ## Train a paddle to juggle and show it (a minute)

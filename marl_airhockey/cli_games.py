@@ -56,10 +56,11 @@ def league(
     as_json: AsJson = False,
 ) -> None:
     """Let everybody play everybody: ratings, matrix, circles."""
+    need("matplotlib", "train")
     names = list(players or ([] if folder else SCRIPTS))
     names += found_in(folder) if folder else []
     keywords = environment(backend, profile, option, None)
-    entrants = {name: make_driver(name) for name in names}
+    entrants = {label(name, names): make_driver(name) for name in names}
     standings = play_league(scenario, entrants, games, keywords=keywords)
     files = standings.save(out)
     responses = best_responses(scenario, names, exploit, out) if exploit else {}
@@ -75,6 +76,12 @@ def league(
     for name, score in responses.items():
         console.print(f"best response to {name} after {exploit:,} steps: {score:.3f}")
     console.print("files:", *files)
+
+
+def label(name: str, names: list[str]) -> str:
+    """A path by its end, as long as that is nobody else's."""
+    short = "/".join(Path(name).parts[-2:])
+    return short if sum(n.endswith(short) for n in names) == 1 else name
 
 
 def best_responses(

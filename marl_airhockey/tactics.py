@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.driver import View
@@ -121,8 +122,47 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
     return np.stack([np.full_like(aside, line), np.clip(aside, -wide, wide)], -1)
 
 
-MOMENTS = np.linspace(0.0, 1.2, 25)
-"""s ahead: when a puck may be met."""
+LOOK, FURTHEST = 0.05, 1.2
+"""s: a puck's way is looked at in such steps, so far ahead."""
+
+
+@njit(cache=True, error_model="numpy")
+def _meeting(
+    place: Array,
+    motion: Array,
+    own: Array,
+    speed: Array,
+    aim: Array,
+    low: Array,
+    high: Array,
+    touch: float,
+    half: float,
+) -> tuple[Array, Array, Array]:
+    """When and where a paddle can first be behind a puck, and the way from there.
+
+    All (W, ...); the time is infinite where it never can, the place then is the puck's.
+    """
+    due, there, way = np.empty(len(own)), np.empty_like(own), np.empty_like(own)
+    for w in range(len(own)):
+        due[w] = np.inf
+        for moment in np.arange(0.0, FURTHEST + 0.5 * LOOK, LOOK):
+            x = place[w, 0] + motion[w, 0] * moment
+            y = place[w, 1] + motion[w, 1] * moment
+            if np.isfinite(half):
+                y = half - abs((y + half) % (4 * half) - 2 * half)
+            ox, oy = aim[w, 0] - x, aim[w, 1] - y
+            size = max(np.sqrt(ox * ox + oy * oy), 1e-6)
+            ox, oy = ox / size, oy / size
+            bx = min(max(x - ox * (touch + 0.03), low[0]), high[0]) - own[w, 0]
+            by = min(max(y - oy * (touch + 0.03), low[1]), high[1]) - own[w, 1]
+            need = np.sqrt(bx * bx + by * by) / max(speed[w], 1e-6)
+            fits = low[0] < x < high[0] + 0.7 * touch and need <= moment + LOOK
+            if fits or moment == 0.0:
+                there[w, 0], there[w, 1], way[w, 0], way[w, 1] = x, y, ox, oy
+            if fits:
+                due[w] = moment
+                break
+    return due, there, way
 
 
 def attack(
@@ -148,17 +188,9 @@ def attack(
     touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
     low, high = view.reach.min(0), view.reach.max(0)
 
-    ahead = place[:, None] + motion[:, None] * MOMENTS[:, None]
-    ahead[..., 1] = field.fold(ahead[..., 1])
-    out = aim[:, None] - ahead
-    out /= np.maximum(length(out), 1e-6)[..., None]
-    behind = np.clip(ahead - out * (touch + 0.03), low, high)
-    need = length(behind - own[:, None]) / np.maximum(speed, 1e-6)[:, None]
-    fits = (ahead[..., 0] < high[0] + 0.7 * touch) & (need <= MOMENTS + 0.05)
-    fits &= ahead[..., 0] > low[0]
-    met, rows = fits.argmax(-1), np.arange(len(own))
-    due, there, way = MOMENTS[met], ahead[rows, met], out[rows, met]
-
+    due, there, way = _meeting(
+        place, motion, own, speed, aim, low, high, touch, field.half
+    )
     contact = there - way * touch
     gap = contact - own
     along = (gap * way).sum(-1)
@@ -173,7 +205,7 @@ def attack(
     detour = np.stack([there[:, 0] - 1.2 * touch, there[:, 1] + room], -1)
     target = np.where(wrong[:, None], np.clip(detour, low, high), contact - way * 0.05)
     asked = np.where(strike[:, None], through, (target - own) * 12.0)
-    return asked, np.where(fits.any(-1), due, np.inf)
+    return asked, due
 
 
 def open_goal(view: View, field: Field) -> Array:

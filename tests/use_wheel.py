@@ -18,6 +18,9 @@ for name in ah.scenario_names():
     env.close()
 env = gymnasium.make("marl_airhockey/Juggle-v0")
 assert env.reset(seed=0)[0].shape == env.observation_space.shape
+with_a_mate = ah.parallel_env("rally", drivers={"paddle_1": "zoo/rally"})
+with_a_mate.reset(seed=0)
+with_a_mate.step({"paddle_0": np.zeros(2, np.float32)})
 for driver in ah.agent_names():
     if driver != "policy":
         ah.make_agent(driver)

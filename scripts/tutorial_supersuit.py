@@ -1,0 +1,75 @@
+"""Parameter sharing with SuperSuit and stable-baselines3, as PettingZoo's tutorials do.
+
+    python scripts/tutorial_supersuit.py --steps 200000
+
+One policy learns to play both ends of a duel against itself. SuperSuit turns every
+agent into a slot of a vector environment; SB3 sees ordinary environments. Our
+own `make_sb3_vec` does the same for thousands of worlds at once, with seeds and the
+right values at time limits, which SuperSuit 3.11 lacks; `airhockey train duel` adds
+opponents. So this is the way for those who have a SuperSuit pipeline already.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from typing import Annotated, Any
+
+import numpy as np
+import torch
+import typer
+from stable_baselines3 import PPO
+
+import marl_airhockey as ah
+from marl_airhockey.contest import challenge
+from marl_airhockey.learn.policy import Policy
+from marl_airhockey.registry import make_driver
+
+
+def environment(copies: int) -> Any:
+    """An SB3 VecEnv of ``copies`` duels: two slots each."""
+    with warnings.catch_warnings():
+        # SuperSuit still asks gymnasium for names that it is going to drop.
+        warnings.simplefilter("ignore")
+        import supersuit
+    env = ah.parallel_env("duel", backend="batched", options={"seconds": 20.0})
+    slots = supersuit.pettingzoo_env_to_vec_env_v1(env)
+    base = "stable_baselines3"
+    return supersuit.concat_vec_envs_v1(slots, copies, num_cpus=0, base_class=base)
+
+
+def main(
+    steps: Annotated[int, typer.Option(help="Steps of single agents.")] = 200_000,
+    copies: Annotated[int, typer.Option(help="Duels at once.")] = 16,
+    games: Annotated[int, typer.Option(help="Games of the evaluation.")] = 100,
+) -> None:
+    """Train, and play against a random driver."""
+    torch.set_num_threads(1)  # small networks gain nothing from more
+    env = environment(copies)
+    model = PPO(
+        "MlpPolicy",
+        env,
+        n_steps=256,
+        batch_size=1024,
+        n_epochs=4,
+        learning_rate=1e-3,
+        policy_kwargs={"net_arch": [64, 64], "log_std_init": -0.5},
+        device="cpu",
+    )
+    began = time.perf_counter()
+    model.learn(steps)
+    rate = model.num_timesteps / (time.perf_counter() - began)
+
+    def predict(observation: Any, mean: bool) -> Any:
+        return np.asarray(model.predict(observation, deterministic=mean)[0])
+
+    rivals = [make_driver("random")]
+    score, margin = challenge(
+        "duel", Policy(predict), rivals, games, 0, {"backend": "batched"}
+    )
+    print(f"{model.num_timesteps:,} agent-steps at {rate:,.0f} per second")
+    print(f"score against random: {score[0]:.3f} ({margin[0]:+.2f} goals a game)")
+
+
+if __name__ == "__main__":
+    typer.run(main)

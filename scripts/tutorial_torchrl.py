@@ -1,0 +1,145 @@
+"""MAPPO with TorchRL: a critic that sees the true state, on the rally game.
+
+    python scripts/tutorial_torchrl.py --updates 20
+
+`PettingZooWrapper` takes the environment as it is; `group_map` puts the mates into one
+group and `return_state` hands the critic what no agent sees alone. TorchRL steps one
+world at a time: it is the way to its algorithms (and BenchMARL's), not to speed.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import torch
+import typer
+from pettingzoo.utils import BaseParallelWrapper
+from tensordict.nn import TensorDictModule
+from tensordict.nn.distributions import NormalParamExtractor
+from torch import nn
+from torchrl.collectors import Collector
+from torchrl.envs import RewardSum, TransformedEnv, check_env_specs
+from torchrl.envs.libs.pettingzoo import PettingZooWrapper
+from torchrl.modules import MultiAgentMLP, ProbabilisticActor, TanhNormal
+from torchrl.objectives import ClipPPOLoss, ValueEstimators
+
+import marl_airhockey as ah
+
+GROUP = "team_0"
+
+
+class StateCritic(nn.Module):
+    """One value for all agents from the global state."""
+
+    def __init__(self, size: int, agents: int) -> None:
+        super().__init__()
+        self.agents = agents
+        self.net = nn.Sequential(
+            nn.Linear(size, 64),
+            nn.ReLU(),
+            nn.Linear(64, 64),
+            nn.ReLU(),
+            nn.Linear(64, 1),
+        )
+
+    def forward(self, state: torch.Tensor) -> torch.Tensor:
+        """(..., agents, 1) for states (..., D)."""
+        value: torch.Tensor = self.net(state)
+        return value[..., None, :].expand(*value.shape[:-1], self.agents, 1)
+
+
+class WithoutInfos(BaseParallelWrapper[Any, Any, Any]):  # type: ignore[misc]
+    """TorchRL makes tensors of infos, which ours, with their names, are not."""
+
+    def reset(self, seed: int | None = None, options: Any = None) -> Any:
+        """The same, with nothing in the infos."""
+        seen, infos = self.env.reset(seed, options)
+        return seen, {agent: {} for agent in infos}
+
+
+def environment() -> TransformedEnv:
+    """A rally as TorchRL wants it, with the return of episodes."""
+    raw = ah.parallel_env("rally", backend="batched")
+    env = PettingZooWrapper(
+        WithoutInfos(raw),
+        return_state=True,
+        group_map=raw.group_map,
+        use_mask=False,
+        categorical_actions=False,
+    )
+    returns = RewardSum(in_keys=[(GROUP, "reward")], out_keys=[(GROUP, "returns")])
+    return TransformedEnv(env, returns)
+
+
+def main(
+    updates: Annotated[int, typer.Option(help="Policy updates.")] = 20,
+    frames: Annotated[int, typer.Option(help="Steps between two updates.")] = 2000,
+    seed: Annotated[int, typer.Option(help="Of network and environment.")] = 0,
+) -> None:
+    """Check the environment, then train."""
+    torch.manual_seed(seed)
+    torch.set_num_threads(1)
+    env = environment()
+    env.set_seed(seed)
+    check_env_specs(env)
+    agents, size = env.observation_spec[GROUP, "observation"].shape
+    actor_net = nn.Sequential(
+        MultiAgentMLP(
+            size, 4, agents, centralized=False, share_params=True, depth=2, num_cells=64
+        ),
+        NormalParamExtractor(),
+    )
+    keys = [(GROUP, "loc"), (GROUP, "scale")]
+    actor = ProbabilisticActor(
+        TensorDictModule(actor_net, in_keys=[(GROUP, "observation")], out_keys=keys),
+        spec=env.full_action_spec[GROUP, "action"],
+        in_keys=keys,
+        out_keys=[(GROUP, "action")],
+        distribution_class=TanhNormal,
+        return_log_prob=True,
+        log_prob_key=(GROUP, "log_prob"),
+    )
+    critic = TensorDictModule(
+        StateCritic(env.observation_spec["state"].shape[-1], agents),
+        in_keys=["state"],
+        out_keys=[(GROUP, "state_value")],
+    )
+    loss = ClipPPOLoss(actor, critic, clip_epsilon=0.2, entropy_coeff=1e-3)
+    loss.set_keys(
+        reward=(GROUP, "reward"),
+        action=(GROUP, "action"),
+        value=(GROUP, "state_value"),
+        sample_log_prob=(GROUP, "log_prob"),
+        done=(GROUP, "done"),
+        terminated=(GROUP, "terminated"),
+    )
+    loss.make_value_estimator(ValueEstimators.GAE, gamma=0.98, lmbda=0.95)
+    optimizer = torch.optim.Adam(loss.parameters(), lr=1e-3)
+    collector = Collector(
+        env,
+        actor,
+        frames_per_batch=frames,
+        total_frames=updates * frames,
+        auto_register_policy_transforms=False,
+    )
+    for update, data in enumerate(collector):
+        with torch.no_grad():
+            loss.value_estimator(data)
+        flat = data.reshape(-1)
+        for _ in range(4):
+            for rows in torch.split(torch.randperm(len(flat)), 500):
+                losses = loss(flat[rows])
+                total = sum(v for k, v in losses.items() if k.startswith("loss_"))
+                optimizer.zero_grad()
+                total.backward()
+                nn.utils.clip_grad_norm_(loss.parameters(), 0.5)
+                optimizer.step()
+        done = data["next", GROUP, "done"]
+        returns = data["next", GROUP, "returns"][done]
+        mean = f"{returns.mean():.2f}" if len(returns) else "no episode ended"
+        print(f"update {update + 1}: crossings an episode {mean}")
+    collector.shutdown()
+
+
+if __name__ == "__main__":
+    typer.run(main)
