@@ -1,6 +1,6 @@
-"""Draw every scenario a moment into a scripted episode, as one picture for the docs.
+"""Draw every scenario a moment into a scripted episode, as two pictures for the docs.
 
-python scripts/picture_tasks.py --out docs/images/tasks.png
+python scripts/picture_tasks.py --out docs/images
 """
 
 from __future__ import annotations
@@ -14,39 +14,62 @@ import typer
 
 import marl_airhockey as ah
 from marl_airhockey.render import Renderer, draw
+from marl_airhockey.state import Array
 
 COLUMNS = 2
 MOMENT = 1.9
 """s into the episode, or its last moment."""
+WIDE = 1.5
+"""Tables that are less long for their width are drawn smaller."""
+
+
+def moment(name: str, width: int) -> Array:
+    """A picture of a scenario with scripts in all seats."""
+    seats = ah.make_scenario(name).cast.seats
+    driver = "allround" if len(seats) > 1 else "striker"
+    driver = "reacher" if name.startswith("reach") else driver
+    drivers = {f"paddle_{i}": driver for i in range(len(seats))}
+    world = ah.make_world(name, drivers=drivers)
+    world.autoreset = False
+    world.reset(2)
+    renderer = Renderer(world, "rgb_array", name.replace("_", " "))
+    over = False
+    while not over and world.state.time[0] < MOMENT:
+        step = world.step(np.zeros((1, 0, 2)))
+        over = bool(step.terminated[0] or step.truncated[0])
+        renderer.follow()
+    x, y = world.cast.table.size
+    return draw(renderer.scene(), width if x > WIDE * y else round(0.54 * width))
+
+
+def sheet(pictures: list[Array], width: int) -> Array:
+    """Pictures in rows, on white."""
+    rows = []
+    for i in range(0, len(pictures), COLUMNS):
+        some = pictures[i : i + COLUMNS]
+        row = np.full((max(map(len, some)), COLUMNS * width, 3), 255, np.uint8)
+        for k, picture in enumerate(some):
+            height, wide = picture.shape[:2]
+            row[:height, k * width : k * width + wide] = picture
+        rows.append(row)
+    return np.concatenate(rows, axis=0)
 
 
 def main(
-    out: Annotated[Path, typer.Option(help="PNG to write.")] = Path(
-        "docs/images/tasks.png"
+    out: Annotated[Path, typer.Option(help="Folder of the PNGs.")] = Path(
+        "docs/images"
     ),
     width: Annotated[int, typer.Option(help="Pixels of one scene.")] = 560,
 ) -> None:
     """Play, draw, paste."""
-    pictures = []
+    out.mkdir(parents=True, exist_ok=True)
+    kinds: dict[str, list[Array]] = {"tasks": [], "games": []}
     for name in ah.scenario_names():
-        driver = "reacher" if name.startswith("reach") else "striker"
-        world = ah.make_world(name, drivers={"paddle_0": driver})
-        world.autoreset = False
-        world.reset(2)
-        renderer = Renderer(world, "rgb_array", name.replace("_", " "))
-        over = False
-        while not over and world.state.time[0] < MOMENT:
-            step = world.step(np.zeros((1, 0, 2)))
-            over = bool(step.terminated[0] or step.truncated[0])
-            renderer.follow()
-        pictures.append(draw(renderer.scene(), width))
-    rows = [
-        np.concatenate(pictures[i : i + COLUMNS], axis=1)
-        for i in range(0, len(pictures), COLUMNS)
-    ]
-    out.parent.mkdir(parents=True, exist_ok=True)
-    picture = np.concatenate(rows, axis=0)
-    cv2.imwrite(str(out), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        alone = len(ah.make_scenario(name).cast.seats) == 1
+        kinds["tasks" if alone else "games"].append(moment(name, width))
+    for kind, pictures in kinds.items():
+        picture = cv2.cvtColor(sheet(pictures, width), cv2.COLOR_RGB2BGR)
+        cv2.imwrite(str(out / f"{kind}.png"), picture)
 
 
 if __name__ == "__main__":

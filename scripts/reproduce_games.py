@@ -1,0 +1,164 @@
+"""Train the games with their presets, print what the policies are worth, draw curves.
+
+    python scripts/reproduce_games.py --seeds 3 --jobs 2 --out runs/games
+
+A run that is there already is not trained again. A score is the share of whole games
+won, a draw counting half (in free_for_all, of four players, a quarter), with 95 %
+intervals; both ends in turns. Cooperative games: the mean return of an episode, of
+pairs from one seed, of pairs put together from two seeds, and of a scripted pair.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Annotated
+
+import matplotlib.pyplot as plt
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from marl_airhockey.charts import DPI, INK, INKS, PALE, save, tidy
+from marl_airhockey.contest import challenge
+from marl_airhockey.driver import Driver
+from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.policy import load_policy
+from marl_airhockey.learn.train import train
+from marl_airhockey.make import Keywords
+from marl_airhockey.match import evaluate
+from marl_airhockey.registry import make_driver
+from marl_airhockey.stats import bootstrap, interval
+
+TOGETHER = ("rally", "team_juggle")
+SEEN = ("random", "striker", "allround", "allround:strength=fair")
+UNSEEN = ("goalkeeper", "striker:strength=fair", "allround:strength=weak")
+BATCHED: Keywords = {"backend": "batched"}
+GAMES, SEED = 400, 5_000_000
+
+
+def run(game: str, seed: int, folder: Path) -> None:
+    """Train one seed, or go on with it."""
+    begun = (folder / "config.toml").exists()
+    train(None if begun else preset(game, {"seed": seed}), folder)
+
+
+def milestone(folder: Path, share: float) -> Path:
+    """The snapshot of a run at a share of its training."""
+    past = sorted((folder / "milestones").glob("*.npz"))
+    return past[round(share * len(past)) - 1]
+
+
+def cpu_minutes(folder: Path) -> float:
+    """What a run took."""
+    with (folder / "evaluations.csv").open() as file:
+        return float(list(csv.DictReader(file))[-1]["cpu_seconds"]) / 60
+
+
+def versus(game: str, folders: Sequence[Path]) -> Table:
+    """Scores of each seed against scripts and against its own past."""
+    names = [*SEEN, *UNSEEN, "itself at 1/10"]
+    table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
+    columns = []
+    for folder in folders:
+        rivals: list[Driver] = [make_driver(name) for name in (*SEEN, *UNSEEN)]
+        rivals.append(load_policy(milestone(folder, 0.1)))
+        policy = load_policy(folder / "last.zip")
+        score, _ = challenge(game, policy, rivals, GAMES, SEED, BATCHED)
+        columns.append(score)
+    for i, name in enumerate(names):
+        cells = []
+        for score in columns:
+            low, high = interval(float(score[i]), GAMES)
+            cells.append(f"{score[i]:.3f} ({low:.2f}..{high:.2f})")
+        table.add_row(name, "yes" if name in SEEN else "no", *cells)
+    minutes = [f"{cpu_minutes(folder):.1f}" for folder in folders]
+    table.add_row("CPU-minutes of training", "", *minutes)
+    return table
+
+
+def together(game: str, folders: Sequence[Path]) -> Table:
+    """Returns and success of pairs."""
+    table = Table("pair", "return (95 %)", "success")
+
+    def add(name: str, pairs: Sequence[tuple[Driver, Driver]]) -> None:
+        found = [
+            evaluate(
+                a, name, game, GAMES, SEED, {**BATCHED, "drivers": {"paddle_1": b}}
+            )
+            for a, b in pairs
+        ]
+        returns = np.array([r.returns for r in found])
+        low, high = bootstrap(returns, lambda x: float(x.mean()))
+        share = np.mean([r.success for r in found])
+        table.add_row(
+            name, f"{returns.mean():.1f} ({low:.1f}..{high:.1f})", f"{share:.3f}"
+        )
+
+    policies = [load_policy(folder / "last.zip") for folder in folders]
+    add("one seed", [(p, p) for p in policies])
+    mixed = [(a, b) for a in policies for b in policies if a is not b]
+    if mixed:
+        add("two seeds", mixed)
+    for script in ("striker", "allround"):
+        add(f"two of {script}", [(make_driver(script), make_driver(script))])
+    return table
+
+
+def curves(game: str, folders: Sequence[Path], path: Path) -> None:
+    """Scores against rivals over the CPU time of training: mean and range of seeds."""
+    runs = []
+    for folder in folders:
+        with (folder / "evaluations.csv").open() as file:
+            runs.append(list(csv.DictReader(file)))
+    length = min(map(len, runs))
+    names = [key for key in runs[0][0] if key.startswith("score/")]
+    figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
+    cpu = np.mean([[float(r["cpu_seconds"]) for r in x[:length]] for x in runs], 0) / 60
+    for name, ink in zip(names, (*INKS, INK), strict=False):
+        share = np.array([[float(r[name]) for r in x[:length]] for x in runs])
+        axes.fill_between(cpu, share.min(0), share.max(0), color=PALE, alpha=0.25)
+        axes.plot(cpu, share.mean(0), color=ink, label=name.partition("/")[2])
+    axes.set(
+        xlabel="CPU-minutes of training",
+        ylabel="score: win + draw / 2",
+        ylim=(-0.03, 1.03),
+        title=game.replace("_", " "),
+    )
+    tidy(axes)
+    save(figure, path)
+
+
+def main(
+    games: Annotated[str, typer.Option(help="Comma-separated.")] = "duel,rally",
+    seeds: Annotated[int, typer.Option(help="Seeds 0 .. n - 1.")] = 3,
+    jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
+    out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/games"),
+) -> None:
+    """Train, judge, print, draw."""
+    console, names = Console(), games.split(",")
+    folders = {
+        name: [out / f"{name}-{seed}" for seed in range(seeds)] for name in names
+    }
+    with ProcessPoolExecutor(jobs) as pool:
+        waiting = [
+            pool.submit(run, name, seed, folder)
+            for name, rows in folders.items()
+            for seed, folder in enumerate(rows)
+        ]
+        for done in waiting:
+            done.result()
+    for name, rows in folders.items():
+        console.rule(name)
+        if name in TOGETHER:
+            console.print(together(name, rows))
+            continue
+        console.print(versus(name, rows))
+        curves(name, rows, out / f"{name}.png")
+
+
+if __name__ == "__main__":
+    typer.run(main)
