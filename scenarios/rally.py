@@ -16,10 +16,11 @@ from marl_airhockey.state import Array, Memory, State
 
 @dataclass(frozen=True, kw_only=True)
 class Rally(Scenario):
-    """A crossing of the middle pays both 1 if the seat that it leaves struck it.
+    """A crossing of the middle pays both 1 if the seat that it leaves struck it last.
 
-    That seat must not be the one of the last counted crossing. ``patience`` seconds
-    without a counted one end the rally, and so does a puck that lies.
+    That seat must not be the one of the last counted crossing. Only distinct touches
+    are strikes: a puck that both squeeze at the middle earns nothing. ``patience``
+    seconds without a counted crossing end the rally, and so does a puck that lies.
     """
 
     seats: str = "arcade"
@@ -42,13 +43,17 @@ class Rally(Scenario):
         starts.serve(draws, state, 0, toward)
         names = ("toucher", "counted", "crossings", "idle")
         none = {name: np.zeros(worlds) for name in names}
-        return state, {**rewards.no_touches(worlds, 2, 1), **none}
+        touches = rewards.no_touches(worlds, 2, 1)
+        return state, {**touches, **none, "strikes": touches["touches"].copy()}
 
     def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
         old = memory["toucher"]
-        toucher = rewards.last_toucher(old[..., None], after)[..., 0]
+        fresh = (memory["touches"] > memory["strikes"])[..., 0]
+        at = np.where(fresh, after.touched_at[..., 0], -1.0)
+        latest = np.where(at[..., 0] > at[..., 1], 1.0, 2.0)
+        toucher = np.where(fresh.any(-1), latest, old)
         left = before.puck[..., 0, 0] < 0.0
         crossed = left != (after.puck[..., 0, 0] < 0.0)
         # Numbers count from 1, as `last_toucher` does.
@@ -59,6 +64,7 @@ class Rally(Scenario):
             "toucher": toucher,
             "counted": np.where(counts, seat, memory["counted"]),
             "crossings": memory["crossings"] + counts,
+            "strikes": memory["touches"],
             "idle": np.where(counts, 0.0, memory["idle"] + after.time - before.time),
         }
 
