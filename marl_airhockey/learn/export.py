@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import json
 import shlex
 from dataclasses import fields
 from pathlib import Path
@@ -94,9 +95,13 @@ def command(config: TrainConfig) -> str:
         words.append(f"--profile {config.profile}")
     words += [f"--option {k}={v}" for k, v in config.options.items()]
     words += [f"--driver {k}={v}" for k, v in config.drivers.items()]
-    own = ("scenario", "profile", "options", "drivers", "seed")
+    said = {"scenario", "profile", "options", "drivers", "seed"}
+    if not config.self_play:
+        said |= {"mirror", "opponents", "script_share", "snapshots", "pool", "priority"}
+        said |= {"rivals"}
     for f in fields(config):
         value = getattr(config, f.name)
-        if f.name not in own and value != getattr(usual, f.name):
-            words.append("--set " + shlex.quote(f"{f.name}={value}".replace(" ", "")))
+        if f.name not in said and value != getattr(usual, f.name):
+            setting = f"{f.name}={json.dumps(value, separators=(',', ':'))}"
+            words.append("--set " + shlex.quote(setting))
     return " ".join(words)
