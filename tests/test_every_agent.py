@@ -141,5 +141,5 @@ def test_options_of_a_driver_are_named_when_they_are_wrong():
         make_driver("striker:strength=strog")
     with pytest.raises(ValueError, match="expected NAME=VALUE"):
         make_driver("striker:weak")
-    with pytest.raises(ValueError, match="strenght"):
-        make_driver("striker:strenght=weak")
+    with pytest.raises(ValueError, match="power"):
+        make_driver("striker:power=weak")
