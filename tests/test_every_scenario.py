@@ -62,11 +62,16 @@ def test_pettingzoo_seeds(scenario, backend):
 
 
 def test_pettingzoo_max_cycles(scenario, backend):
+    def seeded(max_cycles):
+        # The test resets without a seed, and luck can end an episode at its first step.
+        env = ah.parallel_env(scenario, backend=backend, max_cycles=max_cycles)
+        env.world.seed(0)
+        for agent in env.possible_agents:
+            env.action_space(agent).seed(0)
+        return env
+
     module = types.SimpleNamespace(
-        env=lambda max_cycles: ah.env(scenario, backend=backend, max_cycles=max_cycles),
-        parallel_env=lambda max_cycles: ah.parallel_env(
-            scenario, backend=backend, max_cycles=max_cycles
-        ),
+        env=lambda max_cycles: parallel_to_aec(seeded(max_cycles)), parallel_env=seeded
     )
     max_cycles_test(module)
 
