@@ -7,20 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from marl_airhockey import tactics
-from marl_airhockey.driver import Driver, View
+from marl_airhockey.driver import View
 from marl_airhockey.state import Array
 
 
 @dataclass
-class Allround(Driver):
-    """Strikes a puck that it can get behind in time; else it guards.
+class Allround(tactics.Scripted):
+    """Strikes a puck that it can get behind in time; else it guards."""
 
-    Raises:
-        ValueError: an unknown strength.
-    """
-
-    strength: str = "strong"
-    """"weak", "fair" or "strong"."""
     depth: float = 0.02
     """m: where it guards, from the near edge of the reach."""
     ready: float = 0.07
@@ -31,9 +25,6 @@ class Allround(Driver):
     """s: a puck that can be met no sooner is waited for."""
     brave: float = 1.6
     """m/s: a puck that comes faster is met by guarding."""
-
-    def __post_init__(self) -> None:
-        self._skill = tactics.skill(self.strength)
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -53,7 +44,7 @@ class Allround(Driver):
         )
         target = np.where(fast[:, None], guard, ready)
         asked = np.where((can & ~fast)[:, None], strike, (target - own) * self.gain)
-        return tactics.paced(asked, view, pace), memory
+        return self._paced(asked, view), memory
 
 
 make = Allround

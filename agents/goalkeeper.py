@@ -7,27 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from marl_airhockey import tactics
-from marl_airhockey.driver import Driver, View
+from marl_airhockey.driver import View
 from marl_airhockey.state import Array
 
 
 @dataclass
-class Goalkeeper(Driver):
-    """Goes where the nearest puck will cross a line before the own end, banks included.
+class Goalkeeper(tactics.Scripted):
+    """Goes where the nearest puck will cross a line near the own end, banks too."""
 
-    Raises:
-        ValueError: an unknown strength.
-    """
-
-    strength: str = "strong"
-    """"weak", "fair" or "strong"."""
     depth: float = 0.03
     """m: distance of the line from the near edge of the reach."""
     gain: float = 8.0
     """1/s: asked speed for a metre of distance."""
-
-    def __post_init__(self) -> None:
-        self._skill = tactics.skill(self.strength)
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -38,7 +29,7 @@ class Goalkeeper(Driver):
             return np.stack([line - own[:, 0], -own[:, 1]], -1) * self.gain, memory
         field = tactics.Field.of(view.cast, view.seat)
         target = tactics.guard(view, field, self.depth, self._skill.lag)
-        return tactics.paced((target - own) * self.gain, view, self._skill.pace), memory
+        return self._paced((target - own) * self.gain, view), memory
 
 
 make = Goalkeeper

@@ -7,24 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from marl_airhockey import tactics
-from marl_airhockey.driver import Driver, View
+from marl_airhockey.driver import View
 from marl_airhockey.rewards import length
 from marl_airhockey.state import Array
 
 
 @dataclass
-class Striker(Driver):
+class Striker(tactics.Scripted):
     """Waits behind the meeting point and strikes through it; one puck at a time.
 
     It aims at the goal, at the first block, or straight up the middle; in games, at the
     open goal. A puck at rest is struck where it lies.
-
-    Raises:
-        ValueError: an unknown strength.
     """
-
-    strength: str = "strong"
-    """In games: "weak", "fair" or "strong"."""
 
     meet_at: float = 0.22
     """m from the near edge of the reach: where a falling puck is met."""
@@ -36,9 +30,6 @@ class Striker(Driver):
     """m/s2: acceleration of a falling puck that it reckons with."""
     gain: float = 9.0
     """1/s: asked speed for a metre of distance."""
-
-    def __post_init__(self) -> None:
-        self._skill = tactics.skill(self.strength)
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -85,9 +76,8 @@ class Striker(Driver):
         strike, due = tactics.attack(view, field, aim, pace, lag)
         own, low = view.state.paddle[:, view.seat], view.reach[:, 0].min()
         home = (np.array([low + 0.2, 0.0]) - own) * self.gain
-        return tactics.paced(
-            np.where(np.isfinite(due)[:, None], strike, home), view, pace
-        )
+        asked = np.where(np.isfinite(due)[:, None], strike, home)
+        return self._paced(asked, view)
 
     def _meeting(
         self, puck: Array, velocity: Array, line: float

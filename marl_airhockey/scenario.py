@@ -39,9 +39,10 @@ class Mark(NamedTuple):
         return Mark("circle", (float(centre[0]), float(centre[1])), radius=radius)
 
     @staticmethod
-    def line(start: tuple[float, float], end: tuple[float, float]) -> Mark:
-        """A line, m."""
-        return Mark("line", (float(start[0]), float(start[1])), end)
+    def across(table: Table, x: float) -> Mark:
+        """A line from one long side to the other, m."""
+        wide = float(table.size[1]) / 2
+        return Mark("line", (float(x), -wide), (float(x), wide))
 
     @staticmethod
     def arrow(start: Array, way: Array) -> Mark:

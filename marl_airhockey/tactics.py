@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from marl_airhockey.cast import Cast
-from marl_airhockey.driver import View
+from marl_airhockey.driver import Driver, View
 from marl_airhockey.physics import unknown
 from marl_airhockey.rewards import length
 from marl_airhockey.state import Array
@@ -34,21 +34,27 @@ STRENGTHS = {
 }
 
 
-def skill(strength: str) -> Skill:
-    """The skill of a strength.
+@dataclass
+class Scripted(Driver):
+    """A scripted player of games, as good as its strength.
 
     Raises:
         ValueError: an unknown strength.
     """
-    if strength not in STRENGTHS:
-        raise ValueError(unknown("strength", strength, STRENGTHS))
-    return STRENGTHS[strength]
 
+    strength: str = "strong"
+    """In games: "weak", "fair" or "strong"."""
 
-def paced(asked: Array, view: View, pace: float) -> Array:
-    """(W, 2) asked m/s as fractions of top speed, none above ``pace``."""
-    share = asked / view.top_speed[:, None]
-    return share * np.minimum(pace / np.maximum(length(share), 1e-9), 1.0)[:, None]
+    def __post_init__(self) -> None:
+        if self.strength not in STRENGTHS:
+            raise ValueError(unknown("strength", self.strength, STRENGTHS))
+        self._skill = STRENGTHS[self.strength]
+
+    def _paced(self, asked: Array, view: View) -> Array:
+        """(W, 2) asked m/s as fractions of top speed, none above its pace."""
+        share = asked / view.top_speed[:, None]
+        most = self._skill.pace / np.maximum(length(share), 1e-9)
+        return share * np.minimum(most, 1.0)[:, None]
 
 
 @dataclass(frozen=True)

@@ -39,24 +39,15 @@ class Juggle(Scenario):
     def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         return starts.falling(draws, self.cast), {
             **rewards.no_touches(worlds, 1, self.pucks),
-            "armed": np.zeros((worlds, self.pucks)),
-            "struck_at": np.full((worlds, self.pucks), -0.5),
+            **rewards.no_lifts(worlds, self.pucks),
             "hits": np.zeros(worlds),
         }
 
     def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
-        height = rewards.contact_height(before, after)
-        struck = ~np.isnan(height)
-        struck_at = np.where(struck, height, memory["struck_at"])
-        armed = np.where(struck, 1.0, memory["armed"])
-        risen = (armed > 0) & (after.puck[..., 0] >= struck_at + self.lift)
-        return {
-            "armed": np.where(risen, 0.0, armed),
-            "struck_at": struck_at,
-            "hits": memory["hits"] + risen.sum(-1),
-        }
+        lifts, risen = rewards.lifts(memory, before, after, self.lift)
+        return {**lifts, "hits": memory["hits"] + risen.sum(-1)}
 
     observation = (
         views.Own(),
@@ -81,9 +72,8 @@ class Juggle(Scenario):
         return np.asarray(memory["hits"] >= self.hits)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        wide = float(self.table_geometry.size[1]) / 2
         armed = memory["struck_at"][memory["armed"] > 0]
-        return [Mark.line((x + self.lift, -wide), (x + self.lift, wide)) for x in armed]
+        return [Mark.across(self.table_geometry, x + self.lift) for x in armed]
 
 
 make = Juggle

@@ -48,28 +48,23 @@ class TeamJuggle(Scenario):
     def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(draws, self.cast)
         state.paddle[:] = [(-0.65, 0.15), (-0.65, -0.15)]
-        names = ("armed", "struck_at", "striker", "passer")
-        none = {name: np.zeros((worlds, self.pucks)) for name in names}
         return state, {
             **rewards.no_touches(worlds, 2, self.pucks),
-            **none,
+            **rewards.no_lifts(worlds, self.pucks),
+            "striker": np.zeros((worlds, self.pucks)),
+            "passer": np.zeros((worlds, self.pucks)),
             "passes": np.zeros(worlds),
         }
 
     def remember(
         self, memory: Memory, before: State, sent: Array, after: State
     ) -> Memory:
-        height = rewards.contact_height(before, after)
-        struck = ~np.isnan(height)
-        struck_at = np.where(struck, height, memory["struck_at"])
-        armed = np.where(struck, 1.0, memory["armed"])
+        lifts, risen = rewards.lifts(memory, before, after, self.lift)
         striker = rewards.last_toucher(memory["striker"], after)
-        risen = (armed > 0) & (after.puck[..., 0] >= struck_at + self.lift)
         passer = memory["passer"]
         passed = risen & (passer > 0) & (passer != striker)
         return {
-            "armed": np.where(risen, 0.0, armed),
-            "struck_at": struck_at,
+            **lifts,
             "striker": striker,
             "passer": np.where(risen, striker, passer),
             "passes": memory["passes"] + passed.sum(-1),
@@ -102,9 +97,8 @@ class TeamJuggle(Scenario):
         return np.asarray(memory["passes"] >= self.passes)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        wide = float(self.table_geometry.size[1]) / 2
         armed = memory["struck_at"][memory["armed"] > 0]
-        return [Mark.line((x + self.lift, -wide), (x + self.lift, wide)) for x in armed]
+        return [Mark.across(self.table_geometry, x + self.lift) for x in armed]
 
 
 make = TeamJuggle

@@ -10,11 +10,10 @@ import marl_airhockey as ah
 from marl_airhockey.contest import play
 from marl_airhockey.frozen import Frozen
 from marl_airhockey.league import found_in, league
-from marl_airhockey.learn.arena import Arena
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.exploit import best_response
 from marl_airhockey.learn.policy import load_policy
-from marl_airhockey.learn.train import build, train
+from marl_airhockey.learn.train import build, environment, train
 from marl_airhockey.registry import make_driver
 from marl_airhockey.roster import Roster
 from marl_airhockey.stats import bootstrap, elo, iqm, probability_of_improvement
@@ -133,18 +132,7 @@ GAME |= {"total_steps": 6144, "opponents": ["random", "goalkeeper"]}
 
 def arena(folder, **changes):
     config = preset("doubles", {**GAME, **changes})
-    return config, Arena(
-        "doubles",
-        config.num_worlds,
-        config.keywords,
-        config.opponents,
-        config.mirror,
-        config.script_share,
-        config.priority,
-        config.pool,
-        folder,
-        0,
-    )
+    return config, environment(config, folder)
 
 
 def test_learners_and_opponents_share_an_arena(tmp_path):
