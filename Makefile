@@ -1,13 +1,14 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint docs clean
+.PHONY: help setup demo test test-all test-distributed lint docs clean
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+FAR := .venv-distributed
 
 help: ## Show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
-		while IFS='|' read -r name what; do printf '  make %-10s %s\n' "$$name" "$$what"; done
+		while IFS='|' read -r name what; do printf '  make %-16s %s\n' "$$name" "$$what"; done
 
 setup: $(READY) ## Set up .venv with all that demo and tests need
 
@@ -28,6 +29,18 @@ test: setup lint ## Run linters, types and the tests that are not slow
 
 test-all: setup lint ## Run every test
 	$(BIN)/pytest
+
+# RLlib pins an older gymnasium, so it has an environment of its own.
+$(FAR)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(FAR)
+	sed '/^gymnasium==/d' constraints.txt > $(FAR)/constraints.txt
+	$(FAR)/bin/pip install --quiet --upgrade pip
+	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt torch
+	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt --editable '.[train,distributed]' pytest pytest-timeout
+	touch $@
+
+test-distributed: $(FAR)/.ready ## Run the tests of RLlib, in an environment of their own
+	$(FAR)/bin/pytest -W ignore tests/test_distributed.py
 
 lint: setup ## Check format, style, spelling and types
 	$(BIN)/ruff format --check .

@@ -79,6 +79,12 @@ def train(
         int | None, typer.Option(help="Units of both layers; the paper's size is 256.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
+    engine: Annotated[
+        str, typer.Option(help="sb3 in this process, rllib over many.")
+    ] = "sb3",
+    num_env_runners: Annotated[
+        int, typer.Option(help="Of rllib: processes that step the worlds.")
+    ] = 0,
     change: Annotated[
         list[str] | None,
         typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
@@ -89,7 +95,6 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
-    need("stable_baselines3", "train")
     from marl_airhockey.learn.config import preset
     from marl_airhockey.learn.train import train as run
 
@@ -98,6 +103,8 @@ def train(
             "seed": seed,
             "backend": backend,
             "profile": profile,
+            "engine": engine,
+            "num_env_runners": num_env_runners,
             "options": settings(option),
             "drivers": settings(other),
         }

@@ -10,10 +10,12 @@ import marl_airhockey as ah
 from marl_airhockey.contest import play
 from marl_airhockey.frozen import Frozen
 from marl_airhockey.league import found_in, league
+from marl_airhockey.learn.arena import environment
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.exploit import best_response
 from marl_airhockey.learn.policy import load_policy
-from marl_airhockey.learn.train import build, environment, train
+from marl_airhockey.learn.ppo import build
+from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
 from marl_airhockey.roster import Roster
 from marl_airhockey.stats import bootstrap, elo, iqm, probability_of_improvement
@@ -132,7 +134,7 @@ GAME |= {"total_steps": 6144, "opponents": ["random", "goalkeeper"]}
 
 def arena(folder, **changes):
     config = preset("doubles", {**GAME, **changes})
-    return config, environment(config, folder)
+    return config, environment(config, config.num_worlds, folder)
 
 
 def test_learners_and_opponents_share_an_arena(tmp_path):

@@ -11,8 +11,9 @@ import numpy as np
 from marl_airhockey.contest import teams_of
 from marl_airhockey.episode import Step
 from marl_airhockey.frozen import Frozen
+from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.policy import frozen_policy
-from marl_airhockey.make import Keywords
+from marl_airhockey.make import Keywords, make_sb3_vec
 from marl_airhockey.registry import make_driver
 from marl_airhockey.roster import Roster
 from marl_airhockey.state import Array
@@ -171,3 +172,27 @@ class Arena(AirHockeyVecEnv):
         self._actions = np.zeros((self.world.num_worlds, len(self._teams), 2))
         self._actions[self._rows, self._seats] = actions
         self._roster.ask(self._actions)
+
+
+def environment(config: TrainConfig, num_worlds: int, pool: Path) -> AirHockeyVecEnv:
+    """The worlds that a configuration is trained in, or a part of them.
+
+    Args:
+        config: of the run.
+        num_worlds: how many of them.
+        pool: folder of the snapshots of self-play.
+    """
+    if not config.self_play:
+        return make_sb3_vec(config.scenario, num_worlds, **config.keywords)
+    return Arena(
+        config.scenario,
+        num_worlds,
+        config.keywords,
+        config.opponents,
+        config.mirror,
+        config.script_share,
+        config.priority,
+        config.pool,
+        pool,
+        config.seed,
+    )

@@ -24,6 +24,14 @@ OPPONENTS = (
     "allround:strength=fair",
 )
 RIVALS = ("random", "goalkeeper:strength=fair", "striker", "allround")
+MAY_BE_ZERO = (
+    "seed",
+    "num_env_runners",
+    "ent_coef",
+    "log_std_init",
+    "mirror",
+    "script_share",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +51,10 @@ class TrainConfig:
     """The scenario's own fields."""
     drivers: dict[str, str] = field(default_factory=dict)
     """Drivers of seats that are not learned, by agent."""
+    engine: str = "sb3"
+    """"sb3" in this process, or "rllib" over many."""
+    num_env_runners: int = 0
+    """Of rllib: processes that step the worlds; 0 for none besides the learner's."""
 
     total_steps: int
     """Steps of single worlds, over all of them."""
@@ -92,8 +104,7 @@ class TrainConfig:
                 raise ValueError(f"{f.name}: expected a number, got {value!r}")
             if f.type == "int" and int(value) != value:
                 raise ValueError(f"{f.name}: expected a whole number, got {value!r}")
-            free = ("seed", "ent_coef", "log_std_init", "mirror", "script_share")
-            if number and f.name not in free and value <= 0:
+            if number and f.name not in MAY_BE_ZERO and value <= 0:
                 raise ValueError(f"{f.name}: {value} must be above 0")
         if not self.hidden or any(w < 1 for w in self.hidden):
             raise ValueError(f"hidden: {self.hidden} must be widths above 0")
@@ -106,11 +117,25 @@ class TrainConfig:
         for name in ("mirror", "script_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
+        if self.engine == "rllib":
+            self._check_rllib()
         rollout = self.n_steps * self.slots
         if rollout % self.batch_size:
             raise ValueError(
                 f"batch_size: {self.batch_size} must divide n_steps x learners in "
                 f"num_worlds worlds, {rollout}"
+            )
+
+    def _check_rllib(self) -> None:
+        if self.observe == "pixels" or self.options.get("goals"):
+            raise ValueError(
+                "engine: rllib learns from flat observations here; take sb3 for "
+                'observe="pixels" and goals="dict"'
+            )
+        runners = self.num_env_runners
+        if runners < 0 or self.num_worlds % max(runners, 1):
+            raise ValueError(
+                f"num_env_runners: {runners} must divide num_worlds, {self.num_worlds}"
             )
 
     @cached_property

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from marl_airhockey.film import film
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.keeper import Report
+from marl_airhockey.learn.ledger import Report
 from marl_airhockey.learn.plots import learning_curve
 from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train, versions

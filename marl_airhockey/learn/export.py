@@ -14,7 +14,7 @@ from stable_baselines3 import PPO
 from marl_airhockey.contest import challenge
 from marl_airhockey.frozen import Frozen
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
-from marl_airhockey.learn.keeper import Progress
+from marl_airhockey.learn.ledger import Progress
 from marl_airhockey.learn.network import freeze
 from marl_airhockey.learn.policy import Policy, frozen_policy
 from marl_airhockey.match import TEST_SEED, evaluate
@@ -36,11 +36,9 @@ def export(run: Path, out: Path) -> Frozen:
         ValueError: no run, or a policy that cannot be frozen.
     """
     config = load_config(run / "config.toml")
-    if not (run / "last.zip").exists():
-        raise ValueError(f"{run}: there is no last.zip in it; train it first")
-    progress = Progress.load(run / "state.json")
-    model = PPO.load(run / "last.zip", device="cpu")
-    bare = freeze(model, vars(model)["card"])
+    if not (run / "state.json").exists():
+        raise ValueError(f"{run}: there is no policy in it yet; train it first")
+    progress, bare = Progress.load(run / "state.json"), _last(run)
     policy = frozen_policy(bare, str(run))
     grades = _games(policy, config) if config.self_play else _episodes(policy, config)
     card = {
@@ -59,6 +57,14 @@ def export(run: Path, out: Path) -> Frozen:
     out.parent.mkdir(parents=True, exist_ok=True)
     frozen.save(out)
     return frozen
+
+
+def _last(run: Path) -> Frozen:
+    """The last policy of a run."""
+    if (run / "last.npz").exists():
+        return Frozen.load(run / "last.npz")
+    model = PPO.load(run / "last.zip", device="cpu")
+    return freeze(model, vars(model)["card"])
 
 
 def _episodes(policy: Policy, config: TrainConfig) -> dict[str, Any]:

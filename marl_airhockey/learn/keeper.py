@@ -1,13 +1,8 @@
-"""What goes on beside the learning: evaluation, checkpoints, logs, learning rate."""
+"""What goes on beside the learning of stable-baselines3: rate, logs, checkpoints."""
 
 from __future__ import annotations
 
-import csv
-import json
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 from stable_baselines3 import PPO
@@ -16,12 +11,11 @@ from stable_baselines3.common.callbacks import BaseCallback
 from marl_airhockey.frozen import Frozen
 from marl_airhockey.learn.arena import Arena
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.judge import judge
+from marl_airhockey.learn.judge import Grades, judge
+from marl_airhockey.learn.ledger import Ledger
 from marl_airhockey.learn.network import freeze
+from marl_airhockey.learn.policy import Policy
 from marl_airhockey.vector_sb3 import AirHockeyVecEnv
-
-Report = Callable[[int, int, dict[str, float]], None]
-"""Called with steps done, steps in all, and the newest evaluation."""
 
 
 class Rate:
@@ -48,50 +42,14 @@ class Rate:
             self.rate = min(self.rate * 1.5, config.highest_rate)
 
 
-@dataclass
-class Progress:
-    """Where a run stands; ``state.json``."""
-
-    steps: int = 0
-    cpu_seconds: float = 0.0
-    wall_seconds: float = 0.0
-    rate: float = 0.0
-    best: tuple[float, float] = (-1.0, float("-inf"))
-    """Success and return of the best evaluation."""
-
-    def save(self, path: Path) -> None:
-        """Write it so that a kill leaves the old or the new one."""
-        draft = path.with_suffix(".part")
-        draft.write_text(json.dumps(self.__dict__))
-        draft.replace(path)
-
-    @staticmethod
-    def load(path: Path) -> Progress:
-        """Read it."""
-        data = json.loads(path.read_text())
-        return Progress(**{**data, "best": tuple(data["best"])})
-
-
 class Keeper(BaseCallback):
-    """Evaluates, keeps the best and the last policy, and logs, as training goes on."""
+    """Has the policy judged and kept, and logs, as training goes on."""
 
-    def __init__(
-        self,
-        config: TrainConfig,
-        folder: Path,
-        progress: Progress,
-        rate: Rate,
-        report: Report | None,
-    ) -> None:
+    def __init__(self, ledger: Ledger, rate: Rate) -> None:
         super().__init__()
-        self.config, self.folder, self.progress = config, folder, progress
-        self.rate, self.report = rate, report
-        self._every = max(config.total_steps // config.evaluations, 1)
-        self._next = (progress.steps // self._every + 1) * self._every
+        self.ledger, self.rate = ledger, rate
         # The first one at once: there must be somebody to play against.
-        self._due = progress.steps
-        self._row: dict[str, float] = {}
-        self._clock = (time.process_time(), time.perf_counter())
+        self._due = ledger.progress.steps
 
     def _freeze(self) -> Frozen:
         """The policy as it is."""
@@ -118,62 +76,40 @@ class Keeper(BaseCallback):
         if divergence is not None:
             self.rate.adapt(float(divergence))
         self._account()
-        if self.num_timesteps >= self._next:
+        if self.ledger.due:
             self.checkpoint()
-            self._next += self._every
-        env = self.training_env
+        env, config = self.training_env, self.ledger.config
         if isinstance(env, Arena) and self.num_timesteps >= self._due:
             env.snapshot(self._freeze(), self.num_timesteps)
-            self._due += self.config.total_steps // self.config.snapshots
-        if self.report is not None:
-            self.report(self.num_timesteps, self.config.total_steps, self._row)
+            self._due += config.total_steps // config.snapshots
 
     def _account(self) -> None:
-        now = (time.process_time(), time.perf_counter())
-        self.progress.cpu_seconds += now[0] - self._clock[0]
-        self.progress.wall_seconds += now[1] - self._clock[1]
-        self._clock = now
-        self.progress.steps, self.progress.rate = self.num_timesteps, self.rate.rate
+        self.ledger.account(self.num_timesteps, self.rate.rate)
 
-    def checkpoint(self) -> dict[str, float]:
-        """Evaluate, keep the policy if it is the best, and save where the run stands.
-
-        The time of evaluations does not count as training.
-        """
+    def checkpoint(self) -> Grades:
+        """Evaluate, and keep the policy if it is the best."""
         self._account()
-        grades = judge(self.model, self.config)
-        progress = self.progress
-        clock = {
-            "steps": progress.steps,
-            "cpu_seconds": progress.cpu_seconds,
-            "wall_seconds": progress.wall_seconds,
-        }
-        self._row = {**clock, **grades}
+        ledger, model = self.ledger, self.model
+        predict = partial(_predict, model)
+        shape = model.observation_space.shape
+        grades = judge(
+            lambda mean: Policy(
+                predict, shape, ledger.config.observe, "training", mean
+            ),
+            ledger.config,
+        )
         for name, value in grades.items():
             self.logger.record(f"eval/{name}", value)
-        table = self.folder / "evaluations.csv"
-        fresh = not table.exists()
-        with table.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(self._row))
-            if fresh:
-                writer.writeheader()
-            writer.writerow(self._row)
-        score = (next(iter(grades.values())), grades["return"])
-        if score > tuple(progress.best):
-            progress.best = score
-            _save(self.model, self.folder / "best.zip")
-        _save(self.model, self.folder / "last.zip")
-        if self.config.self_play:
-            past = self.folder / "milestones"
-            past.mkdir(exist_ok=True)
-            name = f"{progress.steps:012d}.npz"
-            self._freeze().save(past / name)
-        self.progress.save(self.folder / "state.json")
-        self._clock = (time.process_time(), time.perf_counter())
-        return self._row
+        row = ledger.record(grades, self._save)
+        if ledger.config.self_play:
+            self._freeze().save(ledger.milestone)
+        return row
+
+    def _save(self, name: str) -> None:
+        draft = self.ledger.folder / f"part-{name}.zip"
+        self.model.save(draft)
+        draft.replace(self.ledger.folder / f"{name}.zip")
 
 
-def _save(model: Any, path: Path) -> None:
-    draft = path.with_name(f"part-{path.name}")
-    model.save(draft)
-    draft.replace(path)
+def _predict(model: Any, observation: Any, deterministic: bool) -> Any:
+    return model.predict(observation, deterministic=deterministic)[0]

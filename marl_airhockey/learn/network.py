@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from marl_airhockey.frozen import Frozen
+from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.vector_sb3 import AirHockeyVecEnv
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -47,8 +49,17 @@ class FixedScale(BaseFeaturesExtractor):
         return torch.cat([flat, *goals], dim=-1)
 
 
+def card(config: TrainConfig, env: AirHockeyVecEnv) -> dict[str, Any]:
+    """What a policy wants to see: goes with it wherever it is saved."""
+    return {
+        "scenario": config.scenario,
+        "observe": config.observe,
+        "labels": list(env.world.observer.layout.labels),
+    }
+
+
 def freeze(model: PPO, card: Mapping[str, Any]) -> Frozen:
-    """The actor of a model that `train.build` made, as plain arrays.
+    """The actor of a model that `ppo.build` made, as plain arrays.
 
     Raises:
         ValueError: another kind of model: pixels, dict goals, other layers.
@@ -58,15 +69,25 @@ def freeze(model: PPO, card: Mapping[str, Any]) -> Frozen:
     kinds = {type(layer) for layer in layers}
     if not isinstance(scale, FixedScale) or kinds - {torch.nn.Linear, torch.nn.ReLU}:
         raise ValueError("freeze: only policies on flat observations with ReLU layers")
-    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
+    return frozen([*layers, policy.action_net], scale, policy.log_std, card)
+
+
+def frozen(
+    layers: Iterable[torch.nn.Module],
+    scale: FixedScale,
+    log_std: torch.Tensor,
+    card: Mapping[str, Any],
+) -> Frozen:
+    """Linear layers (what lies between them is rectifiers) as plain arrays."""
 
     def array(tensor: torch.Tensor) -> Any:
         return tensor.detach().cpu().numpy().astype(np.float32).copy()
 
+    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
     return Frozen(
-        [(array(x.weight), array(x.bias)) for x in [*linear, policy.action_net]],
+        [(array(x.weight), array(x.bias)) for x in linear],
         array(scale.centre),
         array(1.0 / scale.rate),
-        array(policy.log_std),
+        array(log_std),
         card,
     )

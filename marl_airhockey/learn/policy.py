@@ -17,6 +17,8 @@ from marl_airhockey.frozen import Frozen
 from marl_airhockey.state import Array
 
 Predict = Callable[[Any, bool], Array]
+KINDS = ("zip", "npz")
+"""What engines write: stable-baselines3 files, frozen ones."""
 
 
 @dataclass
@@ -66,8 +68,8 @@ def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
     """
     path = Path(path)
     if path.is_dir():
-        best = path / "best.zip"
-        path = best if best.exists() else path / "last.zip"
+        kept = [path / f"{n}.{kind}" for n in ("best", "last") for kind in KINDS]
+        path = next((file for file in kept if file.exists()), kept[0])
     if not path.exists():
         raise ValueError(f"{path}: there is no such policy file")
     if path.suffix == ".npz":

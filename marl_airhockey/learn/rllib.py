@@ -1,0 +1,142 @@
+"""The engine "rllib": PPO of Ray, with worlds stepped in as many processes as wanted.
+
+On a local Ray, or on the cluster that ``RAY_ADDRESS`` names. Each env runner steps its
+share of the worlds as one batch and hands over an episode chunk for each of its seats.
+Unlike with the engine "sb3", the learning rate fades on a fixed schedule and every
+runner has its own pool of past selves.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import ray
+import torch
+from ray.rllib.algorithms.ppo import PPO, PPOConfig
+from ray.rllib.core import DEFAULT_MODULE_ID
+from ray.rllib.core.rl_module.rl_module import RLModuleSpec
+
+from marl_airhockey.frozen import Frozen
+from marl_airhockey.learn.arena import environment
+from marl_airhockey.learn.batch_runner import RUNNER_CPU, ActorCritic, BatchRunner
+from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.judge import Grades, judge
+from marl_airhockey.learn.ledger import Ledger
+from marl_airhockey.learn.network import card
+from marl_airhockey.learn.policy import frozen_policy
+from marl_airhockey.vector_sb3 import AirHockeyVecEnv
+
+
+def algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:
+    """RLlib's PPO for a configuration; Ray must run."""
+    probe = environment(config, 1 if not config.self_play else 2, folder / "pool")
+    layout = probe.world.observer.layout
+    model = {
+        "centre": layout.centre.tolist(),
+        "unit": layout.unit.tolist(),
+        "hidden": config.hidden,
+        "log_std_init": config.log_std_init,
+        "card": card(config, probe),
+    }
+    probe.close()
+    rate = config.learning_rate
+    settings = {"train": config, "folder": str(folder.resolve()), "begun": begun}
+    return (
+        PPOConfig()
+        .environment(env=AirHockeyVecEnv, env_config=settings)
+        .env_runners(
+            env_runner_cls=BatchRunner,
+            num_env_runners=config.num_env_runners,
+            num_envs_per_env_runner=1,
+            rollout_fragment_length=config.n_steps,
+        )
+        .learners(num_learners=0)
+        .rl_module(rl_module_spec=RLModuleSpec(ActorCritic, model_config=model))
+        .training(
+            train_batch_size_per_learner=config.n_steps * config.slots,
+            minibatch_size=config.batch_size,
+            num_epochs=config.n_epochs,
+            lr=[[0, rate], [config.total_steps, 0.1 * rate]],
+            gamma=config.gamma,
+            lambda_=config.gae_lambda,
+            clip_param=config.clip_range,
+            vf_clip_param=float("inf"),
+            vf_loss_coeff=0.5,
+            use_kl_loss=False,
+            entropy_coeff=config.ent_coef,
+            grad_clip=config.max_grad_norm,
+        )
+        .fault_tolerance(restart_failed_env_runners=True)
+        .debugging(seed=config.seed, log_level="ERROR")
+        .build_algo()
+    )
+
+
+def start_ray(runners: int) -> None:
+    """Join the cluster of ``RAY_ADDRESS``, or start a small Ray of our own."""
+    if ray.is_initialized():
+        return
+    if "RAY_ADDRESS" in os.environ:
+        ray.init(log_to_driver=False)
+        return
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    ray.init(
+        address="local",
+        # A runner counts as one; they may be more than there are cores.
+        num_cpus=max(os.cpu_count() or 1, runners + 1),
+        include_dashboard=False,
+        object_store_memory=400_000_000,
+        log_to_driver=False,
+        logging_level="ERROR",
+        _temp_dir=tempfile.mkdtemp(prefix="ray-"),
+    )
+
+
+def _checkpoint(ledger: Ledger) -> Path:
+    """Of the steps that ``state.json`` tells of; others are leftovers of a kill."""
+    return (ledger.folder / f"checkpoint-{ledger.progress.steps:012d}").resolve()
+
+
+def learn(ledger: Ledger) -> Grades:
+    """Train to the end of a run, from where it stands."""
+    config, folder, progress = ledger.config, ledger.folder, ledger.progress
+    torch.set_num_threads(config.torch_threads)
+    start_ray(config.num_env_runners)
+    algo = algorithm(config, folder, begun=progress.steps > 0)
+    if progress.steps:
+        algo.restore_from_path(_checkpoint(ledger))
+
+    def policy() -> Frozen:
+        module: ActorCritic = algo.get_module(DEFAULT_MODULE_ID)
+        return module.freeze()
+
+    def keep(name: str) -> None:
+        policy().save(folder / f"{name}.npz")
+
+    def evaluate() -> Grades:
+        now = policy()
+        grades = judge(lambda mean: frozen_policy(now, "training", mean), config)
+        older = list(folder.glob("checkpoint-*"))
+        algo.save_to_path(_checkpoint(ledger))
+        row = ledger.record(grades, keep)
+        for path in older:
+            shutil.rmtree(path)
+        if config.self_play:
+            now.save(ledger.milestone)
+        return row
+
+    row: Grades = {}
+    try:
+        while ledger.left > 0:
+            sampled = algo.train().get("env_runners", {})
+            steps = progress.steps + int(sampled.get("num_env_steps_sampled", 0))
+            cpu = float(sampled.get(RUNNER_CPU, 0.0)) if config.num_env_runners else 0.0
+            ledger.account(steps, config.learning_rate, cpu)
+            if ledger.due or ledger.left <= 0:
+                row = evaluate()
+    finally:
+        algo.stop()
+    return row

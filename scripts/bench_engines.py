@@ -1,0 +1,116 @@
+"""Training throughput of the engines, in turns in one run.
+
+    python scripts/bench_engines.py --rounds 3
+
+Needs an environment with Ray: `make test-distributed` sets one up, and
+`.venv-distributed/bin/python` is its interpreter. A row is one trainer after its
+first iteration: steps of single seats per second of wall time and per CPU-second of
+all its processes, mean and range over the turns.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import ray
+import torch
+import typer
+from rich.console import Console
+from rich.table import Table
+from stable_baselines3.common.logger import Logger
+
+from marl_airhockey.learn.arena import environment
+from marl_airhockey.learn.batch_runner import RUNNER_CPU
+from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.keeper import Rate
+from marl_airhockey.learn.ppo import build
+from marl_airhockey.learn.rllib import algorithm, start_ray
+
+
+class Turn(NamedTuple):
+    """An iteration of training."""
+
+    steps: int
+    wall: float
+    cpu: float
+
+
+def timed(work: Callable[[], tuple[int, float]]) -> Turn:
+    """Run work that tells its steps and the CPU time of other processes."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    steps, elsewhere = work()
+    spent = time.process_time() - cpu + elsewhere
+    return Turn(steps, time.perf_counter() - wall, spent)
+
+
+def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Turn]:
+    """Turns of the engine "sb3"."""
+    config = preset(scenario, {"num_worlds": worlds})
+    env = environment(config, worlds, folder)
+    model = build(config, env, Rate(config, config.learning_rate))
+    model.set_logger(Logger(None, []))
+    steps = config.n_steps * config.slots
+
+    def work() -> tuple[int, float]:
+        model.learn(steps, reset_num_timesteps=False)
+        return steps, 0.0
+
+    return lambda: timed(work)
+
+
+def rllib(scenario: str, worlds: int, folder: Path, runners: int) -> Callable[[], Turn]:
+    """Turns of the engine "rllib"."""
+    changes = {"engine": "rllib", "num_env_runners": runners, "num_worlds": worlds}
+    algo = algorithm(preset(scenario, changes), folder)
+
+    def work() -> tuple[int, float]:
+        found = algo.train()["env_runners"]
+        elsewhere = float(found[RUNNER_CPU]) if runners else 0.0
+        return int(found["num_env_steps_sampled"]), elsewhere
+
+    return lambda: timed(work)
+
+
+def main(
+    scenario: Annotated[str, typer.Option(help="What is trained.")] = "duel",
+    worlds: Annotated[int, typer.Option(help="Worlds of each trainer.")] = 1024,
+    rounds: Annotated[int, typer.Option(help="Turns of each.")] = 3,
+    runners: Annotated[int, typer.Option(help="Most env runners.")] = 2,
+) -> None:
+    """Measure and print."""
+    torch.set_num_threads(1)
+    start_ray(2 * runners + 1)
+    folder = Path(tempfile.mkdtemp())
+    trainers = {"sb3": sb3(scenario, worlds, folder / "sb3")}
+    for n in range(runners + 1):
+        name = f"rllib, {n} env runners"
+        trainers[name] = rllib(scenario, worlds, folder / str(n), n)
+    turns: dict[str, list[Turn]] = {name: [] for name in trainers}
+    for i in range(rounds + 1):
+        for name, turn in trainers.items():
+            found = turn()
+            if i:
+                turns[name].append(found)
+    table = Table("trainer", "steps per s", "range", "steps per CPU-s", "of sb3")
+    base = np.mean([t.steps / t.cpu for t in turns["sb3"]])
+    for name, rows in turns.items():
+        wall = [t.steps / t.wall for t in rows]
+        cpu = float(np.mean([t.steps / t.cpu for t in rows]))
+        table.add_row(
+            name,
+            f"{np.mean(wall):,.0f}",
+            f"{min(wall):,.0f}..{max(wall):,.0f}",
+            f"{cpu:,.0f}",
+            f"{cpu / base:.2f}",
+        )
+    Console().print(table)
+    ray.shutdown()
+
+
+if __name__ == "__main__":
+    typer.run(main)

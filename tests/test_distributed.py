@@ -1,0 +1,109 @@
+"""The engine "rllib": many processes, resumed, and in spite of killed ones.
+
+`make test-distributed` runs these in an environment that has Ray.
+"""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from test_tutorials import run
+
+import marl_airhockey as ah
+from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.export import export
+from marl_airhockey.learn.train import train
+from marl_airhockey.match import evaluate
+from marl_airhockey.registry import make_driver
+
+ray = pytest.importorskip("ray", reason="Ray has an environment of its own")
+
+TOUCH = {"engine": "rllib", "num_worlds": 32, "batch_size": 256, "eval_episodes": 10}
+DUEL = {**TOUCH, "options": {"seconds": 3.0}, "opponents": ["random"], "snapshots": 8}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def a_ray_of_our_own():
+    yield
+    ray.shutdown()
+
+
+def rows(folder):
+    with (folder / "evaluations.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_it_learns_and_its_policy_drives_without_ray(tmp_path):
+    folder = tmp_path / "touch-0"
+    changes = {**TOUCH, "total_steps": 98_304, "evaluations": 2, "num_env_runners": 2}
+    row = train(preset("touch", changes), folder)
+    assert row["steps"] == 98_304
+    assert [int(r["steps"]) for r in rows(folder)] == [49_152, 98_304]
+    still = evaluate(ah.make_agent("still"), "still", "touch", 200)
+    learned = evaluate(make_driver(str(folder)), "learned", "touch", 200)
+    assert learned.success > still.success + 0.3
+    code = (
+        "import sys, marl_airhockey as ah\n"
+        f"env = ah.parallel_env('touch', drivers={{'paddle_0': {str(folder)!r}}})\n"
+        "env.reset(seed=0); env.step({})\n"
+        "assert 'ray' not in sys.modules and 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+    frozen = export(folder, tmp_path / "touch.npz")
+    assert "engine" in frozen.card["command"]
+
+
+def test_self_play_goes_on_when_a_runner_is_killed(tmp_path):
+    from marl_airhockey.learn.rllib import algorithm, start_ray
+
+    start_ray(2)
+    algo = algorithm(preset("duel", {**DUEL, "num_env_runners": 2}), tmp_path)
+    group = algo.env_runner_group
+    pids = group.foreach_env_runner(lambda _: os.getpid(), local_env_runner=False)
+    assert len(set(pids)) == 2
+    before = algo.train()["env_runners"]["num_env_steps_sampled"]
+    os.kill(pids[0], signal.SIGKILL)
+    for _ in range(20):
+        after = algo.train()["env_runners"]["num_env_steps_sampled"]
+        assert after >= before
+        if group.num_healthy_remote_workers() == 2:
+            break
+        time.sleep(1.0)
+    fresh = group.foreach_env_runner(lambda _: os.getpid(), local_env_runner=False)
+    assert len(set(fresh)) == 2
+    assert set(fresh) != set(pids)
+    assert list((tmp_path / "pool-2").glob("*.npz")), "snapshots of itself to meet"
+    algo.stop()
+
+
+def test_a_killed_run_goes_on_where_it_stood(tmp_path):
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-m", "marl_airhockey.cli", "train", "touch"]
+    command += ["--engine", "rllib", "--steps", "400000", "--out", str(folder)]
+    for setting in ("num_worlds=32", "batch_size=256", "evaluations=40"):
+        command += ["--set", setting]
+    process = subprocess.Popen(
+        [*command, "--set", "eval_episodes=5"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    while not (folder / "state.json").exists() or len(rows(folder)) < 3:
+        assert process.poll() is None, "it ended before it could be killed"
+        time.sleep(0.1)
+    process.kill()
+    process.wait()
+    stood = [int(row["steps"]) for row in rows(folder)]
+    assert stood[-1] < 400_000
+    row = train(None, folder)
+    assert row["steps"] >= 400_000
+    assert [int(r["steps"]) for r in rows(folder)][: len(stood)] == stood
+    assert len(list(folder.glob("checkpoint-*"))) == 1
+
+
+def test_the_tutorial_runs():
+    out = run("tutorial_rllib.py", "--iterations", "1", "--steps", "1000")
+    assert "p0 as a driver scores" in out
