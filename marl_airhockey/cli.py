@@ -204,10 +204,13 @@ def result_table(results: list[Result]) -> Table:
         table.add_column(result.driver, justify="right")
     lines: dict[str, Callable[[Result], str]] = {
         "success": lambda r: f"{r.success:.3f}",
-        "95 % from": lambda r: f"{r.success_interval[0]:.3f}",
-        "95 % to": lambda r: f"{r.success_interval[1]:.3f}",
+        "  95 % from": lambda r: f"{r.success_interval[0]:.3f}",
+        "  95 % to": lambda r: f"{r.success_interval[1]:.3f}",
         "first-shot success": lambda r: f"{r.first_shot:.3f}",
         "return": lambda r: f"{r.returns:.2f}",
+        "  interquartile": lambda r: f"{r.returns_iqm:.2f}",
+        "  95 % from ": lambda r: f"{r.returns_interval[0]:.2f}",
+        "  95 % to ": lambda r: f"{r.returns_interval[1]:.2f}",
         "control steps": lambda r: f"{r.length:.0f}",
         "touches": lambda r: f"{r.hits:.1f}",
         "violations a minute": lambda r: f"{r.deployability.violations_per_minute:.0f}",

@@ -13,7 +13,7 @@ from marl_airhockey.driver import Driver
 from marl_airhockey.make import Keywords, build_world, find_scenario
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
-from marl_airhockey.stats import interval
+from marl_airhockey.stats import bootstrap, interval, iqm
 from marl_airhockey.world import World
 
 TEST_SEED = 2_000_000
@@ -74,6 +74,10 @@ class Result:
     first_shot: float
     """Share that succeeded before a second distinct touch."""
     returns: float
+    returns_iqm: float
+    """Interquartile mean, which a few odd episodes do not move."""
+    returns_interval: tuple[float, float]
+    """95 %, of the interquartile mean, by bootstrap."""
     length: float
     """Control steps, mean."""
     hits: float
@@ -151,6 +155,8 @@ def evaluate(
         success_interval=interval(success, episodes),
         first_shot=float(tally.first_shot.mean()),
         returns=float(tally.returns.mean()),
+        returns_iqm=iqm(tally.returns),
+        returns_interval=bootstrap(tally.returns, iqm),
         length=float(tally.length.mean()),
         hits=float(tally.hits.mean()),
         deployability=Deployability.of(

@@ -22,7 +22,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.charts import DPI, INK, INKS, PALE, save, tidy
+from marl_airhockey.charts import DPI, INK, INKS, curve, save, tidy
 from marl_airhockey.contest import challenge
 from marl_airhockey.driver import Driver
 from marl_airhockey.learn.config import preset
@@ -109,7 +109,7 @@ def together(game: str, folders: Sequence[Path]) -> Table:
 
 
 def curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Scores against rivals over the CPU time of training: mean and range of seeds."""
+    """Scores against rivals over the CPU time of training; see `charts.curve`."""
     runs = []
     for folder in folders:
         with (folder / "evaluations.csv").open() as file:
@@ -120,8 +120,7 @@ def curves(game: str, folders: Sequence[Path], path: Path) -> None:
     cpu = np.mean([[float(r["cpu_seconds"]) for r in x[:length]] for x in runs], 0) / 60
     for name, ink in zip(names, (*INKS, INK), strict=False):
         share = np.array([[float(r[name]) for r in x[:length]] for x in runs])
-        axes.fill_between(cpu, share.min(0), share.max(0), color=PALE, alpha=0.25)
-        axes.plot(cpu, share.mean(0), color=ink, label=name.partition("/")[2])
+        curve(axes, cpu, share, ink, name.partition("/")[2])
     axes.set(
         xlabel="CPU-minutes of training",
         ylabel="score: win + draw / 2",

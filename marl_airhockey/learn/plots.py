@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from marl_airhockey.charts import DPI, INK, INKS, PALE, save, tidy
+from marl_airhockey.charts import DPI, INK, INKS, PALE, curve, save, tidy
 
 
 def learning_curve(
@@ -49,7 +49,7 @@ def learning_curve(
 def seed_curves(
     runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]], path: Path
 ) -> None:
-    """Success against CPU-seconds: mean and range over seeds, a panel for each task.
+    """Success against CPU-seconds, a panel for each task, as `charts.curve` draws it.
 
     Args:
         runs: for each task, the rows of ``evaluations.csv`` of each seed.
@@ -76,8 +76,7 @@ def seed_curves(
         cpu = np.mean(
             [[float(row["cpu_seconds"]) for row in rows[:length]] for rows in seeds], 0
         )
-        axes.fill_between(cpu, share.min(0), share.max(0), color=PALE, alpha=0.6)
-        axes.plot(cpu, share.mean(0), color=INK)
+        curve(axes, cpu, share, INK)
         axes.axhline(0.95, color=INKS[0], linestyle=":", linewidth=1)
         axes.set(title=name.replace("_", " "), ylim=(-0.03, 1.03), xlim=(0, None))
         tidy(axes, legend=None)
