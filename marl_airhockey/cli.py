@@ -1,4 +1,4 @@
-"""The command line: ``airhockey list | train | evaluate | watch | league | bench``."""
+"""The command line: ``airhockey list | train | evaluate | watch | play | league``..."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey import cli_games
+from marl_airhockey import cli_games, cli_play
 from marl_airhockey.catalogue import describe, summary
 from marl_airhockey.cli_common import (
     AsJson,
@@ -35,6 +35,7 @@ from marl_airhockey.registry import make_driver
 
 FLOORS = ("still", "random", "sticky")
 app.command()(cli_games.league)
+app.command()(cli_play.play)
 
 
 @app.command("list")

@@ -1,0 +1,84 @@
+"""The command ``airhockey play``: a table in the browser."""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from marl_airhockey.cli_common import Backend, Options, Profile, console, settings
+from marl_airhockey.extras import need
+from marl_airhockey.make import Keywords
+from marl_airhockey.registry import zoo_names
+
+
+def play(
+    scenario: Annotated[str, typer.Argument(help="What is played.")],
+    opponent: Annotated[
+        str | None,
+        typer.Option(help="Who sits at all other seats; of the zoo if it has one."),
+    ] = None,
+    seat: Annotated[
+        list[str] | None,
+        typer.Option(help="Who sits at one seat, AGENT=NAME; person for people."),
+    ] = None,
+    backend: Backend = "batched",
+    profile: Profile = "ideal",
+    option: Options = None,
+    reaction: Annotated[
+        float, typer.Option(help="ms by which programs act late, 0 to 300.")
+    ] = 0.0,
+    noise: Annotated[
+        float, typer.Option(help="Noise on what programs ask, of top speed.")
+    ] = 0.0,
+    pace: Annotated[
+        float, typer.Option(help="Largest speed of programs, of top speed.")
+    ] = 1.0,
+    record: Annotated[
+        Path | None, typer.Option(help="Write every episode into this folder.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; others need the token.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="0 for a free one.")] = 8480,
+    browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
+) -> None:
+    """Play against a policy, a script or each other in the browser."""
+    need("starlette", "play")
+    need("uvicorn", "play")
+    from marl_airhockey.play.court import PERSON, Court, Fairness
+    from marl_airhockey.play.recorder import Recorder
+    from marl_airhockey.play.server import Door, listen, serve
+    from marl_airhockey.play.session import Session
+
+    keywords: Keywords = {
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+    }
+    fairness = Fairness(reaction / 1000.0, noise, pace)
+    court = Court(scenario, {}, keywords, fairness)
+    usual = f"zoo/{scenario}"
+    rest = opponent or (usual if usual in zoo_names() else "allround")
+    chosen = {str(k): str(v) for k, v in settings(seat).items()}
+    for i in range(len(court.who)):
+        agent = f"paddle_{i}"
+        court.seat(i, chosen.pop(agent, PERSON if i == 0 else rest))
+    if chosen:
+        raise ValueError(f"--seat: {scenario} has no {', '.join(chosen)}")
+    door = Door(host)
+    server = listen(host, port)
+    address = f"http://{_shown(host)}:{server.getsockname()[1]}/"
+    if door.token:
+        address += f"?token={door.token}"
+    console.print(f"{scenario} is at {address} (Ctrl-C ends it)", soft_wrap=True)
+    if browser:
+        threading.Timer(0.5, webbrowser.open, [address]).start()
+    serve(Session(court, Recorder(record) if record else None), door, server)
+
+
+def _shown(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,1 @@
+"""Play in a browser: people, policies and scripts at one table."""

@@ -1,0 +1,290 @@
+"""One table that is played at: its seats, its phases, its clock. No network here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from marl_airhockey.driver import Driver
+from marl_airhockey.episode import Step
+from marl_airhockey.handicap import Handicap
+from marl_airhockey.make import Keywords, build_world
+from marl_airhockey.registry import agent_names, make_agent, make_driver, zoo_names
+from marl_airhockey.seats import Driven
+from marl_airhockey.state import Array
+
+RATE = 60
+"""Ticks, and control steps, per second."""
+COUNTDOWN = 3.0
+"""s before the puck is free."""
+PERSON = "person"
+"""What a seat is called that people take."""
+Phase = Literal["lobby", "countdown", "play", "pause", "done"]
+HANDS = ("mouse", "gamepad")
+"""Drivers that people steer."""
+
+
+@dataclass(frozen=True)
+class Fairness:
+    """How programs are held back; see `handicap.Handicap`."""
+
+    reaction: float = 0.0
+    noise: float = 0.0
+    pace: float = 1.0
+
+    def hold(self, driver: Driver) -> Driver:
+        """The driver, held back."""
+        return Handicap(driver, self.reaction, self.noise, self.pace)
+
+
+class Court:
+    """A world of which every seat is driven, in the phases of a match.
+
+    Args:
+        scenario: its name.
+        seats: who sits where, by agent: `PERSON`, or a driver's name or path.
+        keywords: of the environment, without drivers.
+        fairness: of all programs.
+        seed: of the first episode.
+
+    Raises:
+        ValueError: an unknown scenario, agent or driver.
+    """
+
+    def __init__(
+        self,
+        scenario: str,
+        seats: dict[str, str],
+        keywords: Keywords,
+        fairness: Fairness | None = None,
+        seed: int | None = None,
+    ) -> None:
+        usual: Keywords = {"control_dt": 1 / RATE, "substeps": 4}
+        self.keywords: Keywords = {**usual, **keywords}
+        self.world = build_world(scenario, 1, autoreset=False, keywords=self.keywords)
+        self.cast = self.world.cast
+        self.fairness = fairness if fairness is not None else Fairness()
+        agents = [f"paddle_{i}" for i in range(len(self.cast.seats))]
+        for agent in seats:
+            if agent not in agents:
+                raise ValueError(
+                    f"seat {agent!r} is unknown; {scenario} has {', '.join(agents)}"
+                )
+        self.who = [seats.get(agent, PERSON) for agent in agents]
+        self._hands: list[Driver] = [make_agent("mouse") for _ in agents]
+        self._driven = [self._sit(i) for i in range(len(agents))]
+        self.phase: Phase = "lobby"
+        self.number, self.ticks, self.left = 0, 0, 0.0
+        self.reason = ""
+        self.events: list[list[Any]] = []
+        self.result: Step | None = None
+        self._turns = np.array([self.cast.table.rotation(s.side) for s in self.seats])
+        self.world.reset(seed)
+        self._begin()
+
+    @property
+    def seats(self) -> tuple[Any, ...]:
+        """The seats of the cast."""
+        return self.cast.seats
+
+    @property
+    def choices(self) -> list[str]:
+        """Who may be asked to play: scripts, and the zoo's policies for this game."""
+        game = self.world.scenario.name
+        scripts = [n for n in agent_names() if n not in (*HANDS, "policy", "reacher")]
+        strengths = [
+            f"{name}:strength={strength}"
+            for name in ("allround", "striker", "goalkeeper")
+            for strength in ("weak", "fair")
+        ]
+        mine = [n for n in zoo_names() if n == f"zoo/{game}"]
+        return [*mine, *scripts, *(strengths if len(self.seats) > 1 else [])]
+
+    def _sit(self, i: int) -> Driven:
+        """The driver of a seat as the world calls it."""
+        name, world = self.who[i], self.world
+        driver = self._hands[i]
+        if name != PERSON:
+            driver = self.fairness.hold(make_driver(name))
+        return Driven(i, driver, world.observer, 1, world.control_dt)
+
+    def seat(self, i: int, name: str) -> None:
+        """Give a seat to somebody else; between matches.
+
+        Raises:
+            ValueError: during a match, or an unknown name.
+        """
+        if self.phase not in ("lobby", "done"):
+            raise ValueError("seats change between matches")
+        before, self.who[i] = self.who[i], name
+        try:
+            self._driven[i] = self._sit(i)
+        except ValueError:
+            self.who[i] = before
+            raise
+        self._start_drivers([i])
+
+    def hand(self, i: int, kind: str) -> Driver:
+        """What a person steers a seat with: "mouse" or "gamepad"."""
+        if self.who[i] == PERSON and not _is(self._hands[i], kind):
+            self._hands[i] = make_agent(kind)
+            self._driven[i] = self._sit(i)
+            self._start_drivers([i])
+        return self._hands[i]
+
+    def ego(self, i: int, x: float, y: float) -> tuple[float, float]:
+        """A point or a way of the table frame in the frame of a seat."""
+        turned = self._turns[i] @ np.array([x, y])
+        return float(turned[0]), float(turned[1])
+
+    def _begin(self) -> None:
+        """What a new episode needs."""
+        self.ticks, self.result, self.events = 0, None, []
+        self.number += 1
+        self._start_drivers(range(len(self.seats)))
+
+    def _start_drivers(self, seats: Any) -> None:
+        one, world = np.zeros(1, np.int64), self.world
+        for i in seats:
+            self._driven[i].start(one, world.seeds, world.episode.number)
+
+    def start(self) -> None:
+        """Begin a match, or go on with a paused one."""
+        if self.phase == "pause":
+            self.phase = "countdown" if self.left > 0 else "play"
+        elif self.phase in ("lobby", "done"):
+            if self.phase == "done" or self.ticks:
+                self.world.reset()
+                self._begin()
+            self.phase, self.left = "countdown", COUNTDOWN
+        self.reason = ""
+
+    def pause(self, reason: str = "") -> None:
+        """Hold a running match."""
+        if self.phase in ("play", "countdown"):
+            self.phase, self.reason = "pause", reason
+
+    def end(self, reason: str) -> None:
+        """Break a match off: nobody has won."""
+        if self.phase in ("play", "countdown", "pause"):
+            self.phase, self.reason = "done", reason
+
+    def tick(self) -> bool:
+        """Let a sixtieth of a second pass; whether the world moved."""
+        self.events = []
+        if self.phase == "countdown":
+            self.left -= 1 / RATE
+            if self.left <= 1e-9:
+                self.phase, self.left = "play", 0.0
+        if self.phase != "play":
+            return False
+        self._step()
+        return True
+
+    def _step(self) -> None:
+        world = self.world
+        actions = np.zeros((1, len(self.seats), 2))
+        for i, seat in enumerate(self._driven):
+            actions[:, i] = seat.act(
+                world.sensed,
+                world.memory,
+                world.episode.physics,
+                world.episode.cycles,
+            )
+        self.result = world.step(actions)
+        self.ticks += 1
+        state = world.state
+        for puck, mouth in np.argwhere(state.crossed[0]).tolist():
+            self.events.append(["goal", mouth, puck])
+        for paddle, puck in np.argwhere(state.touched[0] > 0).tolist():
+            self.events.append(["hit", paddle, puck])
+        if self.result.terminated[0] or self.result.truncated[0]:
+            self.phase, self.reason = "done", ""
+
+    @property
+    def winners(self) -> list[int]:
+        """Seats that have done what the scenario calls success."""
+        return np.flatnonzero(self.world.episode.success[0]).tolist()
+
+    def state(self) -> dict[str, Any]:
+        """What a page draws, JSON; metres in the table frame."""
+        world, state = self.world, self.world.state.map(lambda x: x[0])
+        memory = {name: value[0] for name, value in world.memory.items()}
+        retired = world.scenario.retired(memory)
+        return {
+            "phase": self.phase,
+            "n": self.ticks,
+            "time": round(float(state.time), 3),
+            "left": round(self.left, 2),
+            "pads": _rounded(state.paddle),
+            "pucks": _rounded(np.hstack([state.puck, state.puck_velocity])),
+            "blocks": _rounded(state.position[state.bodies.block]),
+            "angles": _rounded(state.angle[state.bodies.block]),
+            "marks": [
+                [m.kind, *_rounded(np.array([*m.start, *m.end, m.radius]))]
+                for m in world.scenario.marks(state, memory)
+            ],
+            "caption": world.scenario.caption(memory),
+            "score": _rounded(world.episode.returns[0]),
+            "success": self.winners,
+            "retired": [] if retired is None else np.flatnonzero(retired).tolist(),
+            "reason": self.reason,
+            "events": self.events,
+        }
+
+    def describe(self) -> dict[str, Any]:
+        """What stays as it is: the table, its seats and what may be chosen, JSON."""
+        table, cast = self.cast.table, self.cast
+        sides = [seat.side for seat in cast.seats]
+        radius = cast.bodies.radius
+        return {
+            "scenario": self.world.scenario.name,
+            "seconds": self.world.max_cycles / RATE,
+            "table": _rounded(np.asarray(table.vertices)),
+            "normals": _rounded(table.normals),
+            "paddle": table.paddle_radius,
+            "puck": table.puck_radius,
+            "blocks": _rounded(np.asarray(radius[cast.bodies.block])),
+            "block_shape": cast.block_shape,
+            "obstacles": [
+                [*o.start, *(o.end or o.start), o.radius] for o in cast.obstacles
+            ],
+            "mouths": [
+                {
+                    "side": mouth.side,
+                    "owner": sides.index(mouth.side) if mouth.side in sides else -1,
+                    "ends": _rounded(_mouth_ends(table, mouth)),
+                }
+                for mouth in cast.mouths
+                if mouth.width is not None
+            ],
+            "seats": [
+                {
+                    "side": seat.side,
+                    "team": seat.team,
+                    "turn": _rounded(self._turns[i]),
+                    "reach": _rounded(np.asarray(seat.reach)),
+                    "speed": seat.speed,
+                    "acceleration": seat.acceleration,
+                }
+                for i, seat in enumerate(cast.seats)
+            ],
+            "choices": self.choices,
+        }
+
+
+def _is(driver: Driver, kind: str) -> bool:
+    return type(driver).__module__.endswith(f".{kind}")
+
+
+def _mouth_ends(table: Any, mouth: Any) -> Array:
+    start, end = table.ends(mouth.side)
+    along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
+    middle = (start + end) / 2
+    return np.array([middle - along, middle + along])
+
+
+def _rounded(values: Array) -> Any:
+    return np.round(values, 4).tolist()

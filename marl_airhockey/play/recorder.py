@@ -1,0 +1,136 @@
+"""Games on disk, line by line: what is written survives a kill of the process.
+
+An episode is a file of JSON lines: ``meta``, a ``step`` for every control step, and an
+``end``. A file without an end was cut off.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import platform
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from marl_airhockey.play.court import Court
+
+FORMAT = 1
+SYNC = 1.0
+"""s between two times that the file is forced onto the disk."""
+
+
+class Recorder:
+    """Writes the episodes of a court into a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
+        self._file: TextIO | None = None
+        self._synced = 0.0
+
+    def begin(self, court: Court, players: list[dict[str, Any]]) -> Path:
+        """Begin a file; ``players`` says of each seat who sits there."""
+        self.end(court, "cut off")
+        now = datetime.datetime.now(datetime.UTC)
+        scenario = court.world.scenario.name
+        stamp = now.strftime("%Y%m%d-%H%M%S-%f")
+        path = self._folder / f"{stamp}-{scenario}.jsonl"
+        self._file = path.open("x")
+        physics = court.world.episode.physics
+        self._write(
+            {
+                "kind": "meta",
+                "format": FORMAT,
+                "began": now.isoformat(),
+                "options": court.keywords.get("options", {}),
+                "backend": court.keywords.get("backend", "pymunk"),
+                "profile": court.keywords.get("profile", "ideal"),
+                "control_dt": court.world.control_dt,
+                "physics": {k: float(v[0]) for k, v in physics.items()},
+                "seed": int(court.world.seeds[0]),
+                "episode": int(court.world.episode.number[0]),
+                "players": players,
+                "fairness": vars(court.fairness),
+                "versions": {
+                    "marl_airhockey": metadata.version("marl_airhockey"),
+                    "python": platform.python_version(),
+                },
+                "court": court.describe(),
+            }
+        )
+        return path
+
+    def step(self, court: Court, delays: list[float | None]) -> None:
+        """Add the step that was just made; ``delays`` are round trips of seats, ms."""
+        if self._file is None or court.result is None:
+            return
+        world, terms = court.world, court.result.terms
+        self._write(
+            {
+                "kind": "step",
+                "clock": round(time.time(), 4),
+                **court.state(),
+                "pad_velocities": np.round(world.state.paddle_velocity[0], 4).tolist(),
+                "asked": np.round(world.asked[0], 4).tolist(),
+                "sent": np.round(world.sent[0], 4).tolist(),
+                "terms": {k: np.round(v[0], 4).tolist() for k, v in terms.items()},
+                "excess": np.round(court.result.excess[0], 4).tolist(),
+                "delays": delays,
+            }
+        )
+        now = time.monotonic()
+        if now - self._synced > SYNC:
+            os.fsync(self._file.fileno())
+            self._synced = now
+
+    def end(self, court: Court, reason: str) -> None:
+        """Close the file with how the episode ended."""
+        if self._file is None:
+            return
+        world = court.world
+        self._write(
+            {
+                "kind": "end",
+                "reason": reason,
+                "steps": court.ticks,
+                "returns": np.round(world.episode.returns[0], 4).tolist(),
+                "success": world.episode.success[0].tolist(),
+            }
+        )
+        os.fsync(self._file.fileno())
+        self._file.close()
+        self._file = None
+
+    def _write(self, row: dict[str, Any]) -> None:
+        assert self._file is not None
+        self._file.write(json.dumps(row, separators=(",", ":")) + "\n")
+        # To the system: a killed process loses nothing of it.
+        self._file.flush()
+
+
+def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
+    """The meta line, the steps and the end ({} if it was cut off) of a recording.
+
+    A last line that is not whole is left out.
+
+    Raises:
+        ValueError: no recording, or one of another format.
+    """
+    rows = []
+    for line in path.read_text().splitlines():
+        try:
+            rows.append(json.loads(line))
+        except json.JSONDecodeError:
+            break
+    if not rows or not isinstance(rows[0], dict) or rows[0].get("kind") != "meta":
+        raise ValueError(f"{path}: no recording of airhockey play")
+    if rows[0].get("format") != FORMAT:
+        raise ValueError(f"{path}: format {rows[0].get('format')}, expected {FORMAT}")
+    steps = [row for row in rows if row["kind"] == "step"]
+    end = rows[-1] if rows[-1]["kind"] == "end" else {}
+    return rows[0], steps, end
