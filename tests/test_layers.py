@@ -22,6 +22,7 @@ LAYERS = (
         "loops",
         "fuse",
         "threads",
+        "handicap",
     },
     {
         "backends",
@@ -49,6 +50,8 @@ LAYERS = (
         "cli",
         "cli_common",
         "cli_games",
+        "cli_play",
+        "play",
     },
 )
 PURE = sorted(LAYERS[0] | LAYERS[1])

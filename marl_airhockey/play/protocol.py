@@ -42,7 +42,7 @@ def parse(text: str) -> tuple[str, dict[str, Any]]:
         raise ValueError("not JSON: too deep") from error
     except json.JSONDecodeError as error:
         raise ValueError("not JSON") from error
-    if not isinstance(data, dict) or data.get("t") not in MESSAGES:
+    if not isinstance(data, dict) or data.get("t") not in list(MESSAGES):
         raise ValueError(f"t: must be one of {', '.join(MESSAGES)}")
     kind = data.pop("t")
     wanted = MESSAGES[kind]
@@ -61,7 +61,7 @@ def _check(name: str, value: Any, kind: type) -> Any:
             raise ValueError(f"{name}: must be 1 to 80 characters")
         return value
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or abs(value) > 1e9:
+    if not number or abs(value) > 1e9 or not math.isfinite(value):
         raise ValueError(f"{name}: must be a number")
     if kind is int and (value != int(value) or value < 0):
         raise ValueError(f"{name}: must be a whole number, not negative")

@@ -87,10 +87,8 @@ def application(session: Session, door: Door) -> Starlette:
         guest = session.join()
         writer = asyncio.create_task(_write(socket, session, guest))
         try:
-            while True:
-                session.hear(guest, await socket.receive_text())
-        except (WebSocketDisconnect, KeyError, RuntimeError):
-            pass  # it has gone, sent bytes, or was cut off by the writer
+            while (message := await socket.receive())["type"] == "websocket.receive":
+                session.hear(guest, message.get("text") or "")
         except ValueError as error:
             with contextlib.suppress(RuntimeError):
                 await socket.close(1008, str(error)[:120])
@@ -139,6 +137,8 @@ def listen(host: str, port: int) -> socket.socket:
     server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         server.bind((host, port))
+        # Whoever is there before the server runs waits for it.
+        server.listen()
     except OSError as error:
         server.close()
         raise ValueError(f"--host {host} --port {port}: {error.strerror}") from error

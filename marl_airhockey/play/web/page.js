@@ -11,7 +11,7 @@ const TRAIL = 26;
 
 let court = null, now = null, before = null, nowAt = 0, beforeAt = 0;
 let socket = null, down = false, refused = "";
-let pointer = null, aimed = 0, sentAt = 0, trip = null, flash = 0, flashColour = "";
+let pointer = null, pointedAt = null, aimed = 0, sentAt = 0, trip = null, flash = 0, flashColour = "";
 let mine = null; // predicted own paddle: x, y, vx, vy
 let predicted = []; // [aim, x, y] of the last aims
 let trails = [], fit = null, drawnAt = performance.now();
@@ -54,10 +54,16 @@ function take(data) {
     trip = trip === null ? spent : trip + 0.1 * (spent - trip);
   }
   for (const [kind, which] of data.events) {
-    if (kind === "goal") { flash = 1; flashColour = colour(court.mouths[which] ? court.mouths[which].owner : 0); beep(220, 0.35); }
+    if (kind === "goal" && court.mouths[which]) { flash = 1; flashColour = colour(scorer(court.mouths[which].owner)); beep(220, 0.35); }
     else beep(520 + 90 * which, 0.05);
   }
   correct(data);
+}
+
+// In a game of two teams the other one has scored; else only who conceded is sure.
+function scorer(owner) {
+  const other = court.seats.findIndex((s) => s.team !== court.seats[owner].team);
+  return new Set(court.seats.map((s) => s.team)).size === 2 ? other : owner;
 }
 
 // -- Own paddle: moved here at once, by the law of the server's driver --
@@ -108,20 +114,22 @@ function aim(event) {
   if (!fit) return;
   const box = canvas.getBoundingClientRect();
   pointer = fromScreen(event.clientX - box.left, event.clientY - box.top);
-  pointer.at = event.timeStamp;
+  pointedAt = event.timeStamp;
+  // At once, not with the next frame: that would cost a hundredth of a second.
+  if (performance.now() - sentAt > 6) tell(performance.now());
 }
 
 function tell(at) {
   if (!now || now.seat === null) return;
   const pad = gamepad();
   if (pad) { sentAt = at; say("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: trip || 0 }); pending.set(aimed, at); return; }
-  const fresh = pointer && pointer.at !== undefined;
+  const fresh = pointedAt !== null;
   if (!pointer || (!fresh && at - sentAt < 250)) return;
-  pending.set(++aimed, fresh ? pointer.at : at);
+  pending.set(++aimed, fresh ? pointedAt : at);
   predicted.push([aimed, mine ? mine.x : 0, mine ? mine.y : 0]);
   if (predicted.length > 90) predicted.shift();
   if (pending.size > 240) pending.delete(pending.keys().next().value);
-  if (fresh) delete pointer.at;
+  pointedAt = null;
   sentAt = at;
   const limit = (v) => Math.max(-10, Math.min(10, v));
   say("aim", { x: limit(pointer[0]), y: limit(pointer[1]), q: aimed, rtt: trip || 0 });
@@ -289,10 +297,10 @@ function drawBodies(share) {
       const [ax, ay] = trail[i - 1], [bx, by] = trail[i], age = i / trail.length;
       if (Math.hypot(bx - ax, by - ay) > 0.3) continue;
       path([[ax, ay], [bx, by]], false); pen.strokeStyle = alpha(inks.puck, 0.22 * age);
-      pen.lineWidth = 2 * court.puck * age * 0.8 * fit.scale; pen.lineCap = "round"; pen.stroke();
+      pen.lineWidth = 1.6 * court.puck * age * fit.scale; pen.stroke();
     }
   });
-  pen.lineCap = "butt"; pen.lineWidth = Math.max(1, 0.004 * fit.scale);
+  pen.lineWidth = Math.max(1, 0.004 * fit.scale);
   now.blocks.forEach((b, i) => {
     const o = old.blocks[i] || b, x = mix(o[0], b[0]), y = mix(o[1], b[1]), r = court.blocks[i];
     if (court.block_shape === "disc") { disc(x, y, r, "#c9a26b", "#7d5f33"); return; }
@@ -318,7 +326,7 @@ function drawBodies(share) {
 function draw(at) {
   const dt = Math.min((at - drawnAt) / 1000, 0.05); drawnAt = at;
   if (court && now) {
-    if (!fit || fit.seat !== now.seat || fit.court !== court) { fit = frameOfView(); pointer = null; }
+    if (!fit || fit.seat !== now.seat || fit.court !== court) { fit = frameOfView(); pointer = pointedAt = null; }
     predict(dt);
     tell(at);
     const gap = Math.max(nowAt - beforeAt, 1);
@@ -366,6 +374,7 @@ function words() {
   else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits ? "Move the pointer to move your paddle. Space starts." : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
   else if (now.phase === "pause") show("Paused", now.reason, say ? "Go on" : "");
   else if (now.phase === "done") show(verdict(), now.reason, say ? "Again" : "");
+  else if (flash > 0.3) show("Goal!", "", "", true);
   else $("notice").hidden = true;
 }
 
