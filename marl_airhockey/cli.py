@@ -227,8 +227,12 @@ def result_table(results: list[Result]) -> Table:
 
 @app.command()
 def watch(
-    driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
-    scenario: Scenario,
+    driver: Annotated[
+        str, typer.Argument(help="A driver's name, a policy's path, or a recording.")
+    ],
+    scenario: Annotated[
+        str, typer.Option("--scenario", "-s", help="What the driver plays.")
+    ] = "",
     backend: Backend = "pymunk",
     profile: Profile = "ideal",
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
@@ -239,13 +243,29 @@ def watch(
     option: Options = None,
     other: Drivers = None,
 ) -> None:
-    """Watch a driver play, in a window or as a video."""
+    """Watch a driver play, in a window or as a video; or a recording of play."""
     from marl_airhockey.film import film
 
+    if driver.endswith(".jsonl"):
+        watch_recording(Path(driver), video)
+        return
+    if not scenario:
+        raise ValueError("--scenario: say what the driver is to play")
     keywords = environment(backend, profile, option, other)
     film(scenario, make_driver(driver), keywords, seed, episodes, video)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
+
+
+def watch_recording(recording: Path, video: Path | None) -> None:
+    """Show a recording in the browser, or make a video of it."""
+    if video is None:
+        cli_play.show(recording, "127.0.0.1", 0, True)
+        return
+    from marl_airhockey.play.film import film
+
+    film(recording, video)
+    console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 
 
 @app.command("bench")

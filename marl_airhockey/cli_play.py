@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,6 +14,15 @@ from marl_airhockey.cli_common import Backend, Options, Profile, console, settin
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
 from marl_airhockey.registry import zoo_names
+
+if TYPE_CHECKING:
+    from starlette.applications import Starlette
+
+    from marl_airhockey.play.server import Door
+
+Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
+Port = Annotated[int, typer.Option(help="0 for a free one.")]
+Browser = Annotated[bool, typer.Option(help="Open the page.")]
 
 
 def play(
@@ -40,18 +50,16 @@ def play(
     record: Annotated[
         Path | None, typer.Option(help="Write every episode into this folder.")
     ] = None,
-    host: Annotated[
-        str, typer.Option(help="Address to listen at; others need the token.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="0 for a free one.")] = 8480,
-    browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
+    host: Host = "127.0.0.1",
+    port: Port = 8480,
+    browser: Browser = True,
 ) -> None:
     """Play against a policy, a script or each other in the browser."""
     need("starlette", "play")
     need("uvicorn", "play")
     from marl_airhockey.play.court import PERSON, Court, Fairness
     from marl_airhockey.play.recorder import Recorder
-    from marl_airhockey.play.server import Door, listen, serve
+    from marl_airhockey.play.server import application
     from marl_airhockey.play.session import Session
 
     keywords: Keywords = {
@@ -69,15 +77,37 @@ def play(
         court.seat(i, chosen.pop(agent, PERSON if i == 0 else rest))
     if chosen:
         raise ValueError(f"--seat: {scenario} has no {', '.join(chosen)}")
+    session = Session(court, Recorder(record) if record else None)
+    _host(lambda door: application(session, door), scenario, host, port, browser)
+    if session.failure is not None:
+        raise session.failure
+
+
+def show(recording: Path, host: str, port: int, browser: bool) -> None:
+    """Show a recording in the browser until interrupted."""
+    need("starlette", "play")
+    need("uvicorn", "play")
+    from marl_airhockey.play.server import replay
+
+    _host(lambda door: replay(recording, door), recording.name, host, port, browser)
+
+
+def _host(
+    make: Callable[[Door], Starlette], what: str, host: str, port: int, browser: bool
+) -> None:
+    """Serve an application, say where, and open it."""
+    from marl_airhockey.play.server import Door, listen, serve
+
     door = Door(host)
+    app = make(door)
     server = listen(host, port)
     address = f"http://{_shown(host)}:{server.getsockname()[1]}/"
     if door.token:
         address += f"?token={door.token}"
-    console.print(f"{scenario} is at {address} (Ctrl-C ends it)", soft_wrap=True)
+    console.print(f"{what} is at {address} (Ctrl-C ends it)", soft_wrap=True)
     if browser:
         threading.Timer(0.5, webbrowser.open, [address]).start()
-    serve(Session(court, Recorder(record) if record else None), door, server)
+    serve(app, server)
 
 
 def _shown(host: str) -> str:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import json
+import os
 import re
 import shutil
 import signal
@@ -15,8 +16,10 @@ import urllib.request
 import numpy as np
 import pytest
 import websockets
+from PIL import Image
 
 from marl_airhockey.play.court import RATE, Court, Fairness
+from marl_airhockey.play.film import film
 from marl_airhockey.play.protocol import BURST, LARGEST, Meter, parse
 from marl_airhockey.play.recorder import Recorder, read
 from marl_airhockey.play.session import IDLE, Session
@@ -241,6 +244,9 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
     np.testing.assert_allclose(
         steps[-1]["pads"], court.world.state.paddle[0], atol=1e-4
     )
+    film(path, tmp_path / "game.gif")
+    with Image.open(tmp_path / "game.gif") as video:
+        assert video.n_frames == RATE
     path.write_text("nothing")
     with pytest.raises(ValueError, match="no recording"):
         read(path)
@@ -249,9 +255,19 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
 @contextlib.contextmanager
 def served(*options):
     """The address of a running `airhockey play`, and its process."""
-    command = [sys.executable, "-m", "marl_airhockey.cli", "play", *options]
+    options = ("play", *options, "--port", "0", "--no-browser")
+    with running(*options) as (address, process):
+        yield address, process
+
+
+@contextlib.contextmanager
+def running(*words):
+    command = [sys.executable, "-m", "marl_airhockey.cli", *words]
     process = subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"], stdout=subprocess.PIPE, text=True
+        command,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "BROWSER": "true"},
     )
     try:
         yield re.search(r"http://\S+", process.stdout.readline())[0], process
@@ -461,5 +477,27 @@ def test_a_phone_plays_upright(browser):
         x, y = box["x"] + box["width"] * 0.5, box["y"] + box["height"] * 0.8
         page.mouse.move(x, y)
         wait(page, "Math.abs(s.pads[0][1]) < 0.03 && s.ack > 0")
+        page.close()
+    assert not complaints
+
+
+def test_a_recording_is_watched_in_the_page(browser, tmp_path):
+    court = Court("duel", {"paddle_0": "striker", "paddle_1": "still"}, {}, seed=1)
+    session = Session(court, Recorder(tmp_path))
+    court.start()
+    for _ in range(8 * RATE):
+        session.tick()
+    session.recorder.end(court, "enough")
+    (path,) = tmp_path.iterdir()
+    complaints = []
+    with running("watch", str(path)) as (address, _):
+        page = page_at(browser, address, complaints)
+        wait(page, "s.n > 30")
+        page.locator("#pause").click()
+        page.locator("#scrub").fill("200")
+        wait(page, "s.n === 201")
+        page.locator("#speed").select_option("4")
+        page.locator("#pause").click()
+        wait(page, "s.n > 260")
         page.close()
     assert not complaints

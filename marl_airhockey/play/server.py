@@ -14,12 +14,13 @@ from urllib.parse import urlsplit
 import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import HTTPConnection, Request
-from starlette.responses import FileResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from marl_airhockey.play.protocol import LARGEST
+from marl_airhockey.play.recorder import read
 from marl_airhockey.play.session import Guest, Session
 
 WEB = Path(__file__).parent / "web"
@@ -58,6 +59,42 @@ def _hostname(host: str) -> str:
     return urlsplit(f"//{host}").hostname or ""
 
 
+def _page(door: Door, mode: str, *routes: BaseRoute) -> list[BaseRoute]:
+    """The routes of the page in a mode, "live" or "replay", and others of its."""
+
+    async def page(request: Request) -> Response:
+        reason = door.refuses(request)
+        if reason is not None:
+            return PlainTextResponse(reason + "\n", 403)
+        return FileResponse(
+            WEB / "page.html", headers={"Content-Security-Policy": POLICY}
+        )
+
+    async def say_mode(_: Request) -> Response:
+        return JSONResponse({"mode": mode})
+
+    files = Mount("/web", StaticFiles(directory=WEB))
+    return [Route("/", page), Route("/mode", say_mode), *routes, files]
+
+
+def replay(path: Path, door: Door) -> Starlette:
+    """The web application that shows a recording.
+
+    Raises:
+        ValueError: no recording.
+    """
+    meta, steps, end = read(path)
+    recording = {"meta": meta, "steps": steps, "end": end}
+
+    async def give(request: Request) -> Response:
+        reason = door.refuses(request)
+        if reason is not None:
+            return PlainTextResponse(reason + "\n", 403)
+        return JSONResponse(recording)
+
+    return Starlette(routes=_page(door, "replay", Route("/recording", give)))
+
+
 def application(session: Session, door: Door) -> Starlette:
     """The web application of a session; its court ticks while the application lives."""
 
@@ -69,14 +106,6 @@ def application(session: Session, door: Door) -> Starlette:
         loop.cancel()
         if session.recorder is not None:
             session.recorder.end(session.court, "the server was stopped")
-
-    async def page(request: Request) -> Response:
-        reason = door.refuses(request)
-        if reason is not None:
-            return PlainTextResponse(reason + "\n", 403)
-        return FileResponse(
-            WEB / "page.html", headers={"Content-Security-Policy": POLICY}
-        )
 
     async def talk(socket: WebSocket) -> None:
         reason = door.refuses(socket)
@@ -96,14 +125,8 @@ def application(session: Session, door: Door) -> Starlette:
             session.part(guest)
             writer.cancel()
 
-    return Starlette(
-        routes=[
-            Route("/", page),
-            WebSocketRoute("/ws", talk),
-            Mount("/web", StaticFiles(directory=WEB)),
-        ],
-        lifespan=lifespan,
-    )
+    routes = _page(door, "live", WebSocketRoute("/ws", talk))
+    return Starlette(routes=routes, lifespan=lifespan)
 
 
 def _note_failure(session: Session, task: asyncio.Task[None]) -> None:
@@ -145,10 +168,10 @@ def listen(host: str, port: int) -> socket.socket:
     return server
 
 
-def serve(session: Session, door: Door, server: socket.socket) -> None:
+def serve(app: Starlette, server: socket.socket) -> None:
     """Serve until interrupted."""
     config = uvicorn.Config(
-        application(session, door),
+        app,
         log_level="error",
         lifespan="on",
         ws_max_size=4 * LARGEST,
@@ -159,5 +182,3 @@ def serve(session: Session, door: Door, server: socket.socket) -> None:
     )
     with contextlib.suppress(KeyboardInterrupt):
         uvicorn.Server(config).run(sockets=[server])
-    if session.failure is not None:
-        raise session.failure

@@ -38,6 +38,39 @@ function connect() {
   socket.onclose = (event) => { down = true; refused = event.reason; setTimeout(connect, 1000); };
 }
 
+// -- A recording instead of a game --
+
+let tape = null; // { steps, at, runs }
+
+async function begin() {
+  const { mode } = await (await fetch("mode" + location.search)).json();
+  if (mode === "live") { connect(); return; }
+  const { meta, steps, end } = await (await fetch("recording" + location.search)).json();
+  court = meta.court;
+  const seats = meta.players.map((p) => ({ who: p.driver, taken: p.person !== null }));
+  tape = { at: 0, runs: true, end, shown: -1, rate: 1 / meta.control_dt };
+  tape.steps = steps.map((step) => ({ ...step, seats, seat: null, ack: 0, watching: 0, rate: 1 / meta.control_dt, recording: false }));
+  $("scrub").max = steps.length - 1;
+  $("timeline").hidden = false;
+  for (const name of ["swap", "leave"]) $(name).hidden = true;
+  $("scrub").oninput = () => { tape.at = Number($("scrub").value); trails = []; };
+  $("scrub").onchange = () => $("scrub").blur();
+  resize();
+}
+
+function play(dt) {
+  const last = tape.steps.length - 1;
+  if (tape.runs) tape.at = Math.min(last, tape.at + dt * Number($("speed").value) * tape.rate);
+  const index = Math.floor(tape.at);
+  if (index === last) tape.runs = false;
+  if (index === tape.shown) return;
+  // Steps in between count for trails and sounds, unless it was a jump.
+  const from = index > tape.shown && index - tape.shown < 12 ? tape.shown + 1 : index;
+  for (let i = from; i <= index; i++) take({ ...tape.steps[i], phase: i === last && tape.end.kind ? "done" : "play" });
+  tape.shown = index;
+  $("scrub").value = index;
+}
+
 function take(data) {
   const at = performance.now();
   if (now && data.n < now.n) trails = [];
@@ -149,7 +182,10 @@ function gamepad() {
 
 canvas.addEventListener("pointermove", aim);
 canvas.addEventListener("pointerdown", (event) => { aim(event); canvas.focus(); });
-function toggle() { say(now && (now.phase === "play" || now.phase === "countdown") ? "pause" : "start"); }
+function toggle() {
+  if (tape) { if (!tape.runs && tape.at >= tape.steps.length - 1) tape.at = 0; tape.runs = !tape.runs; return; }
+  say(now && (now.phase === "play" || now.phase === "countdown") ? "pause" : "start");
+}
 addEventListener("keydown", (event) => {
   if (event.target.tagName === "SELECT" || event.repeat) return;
   if (event.code === "Space" || event.code === "Enter") { if (event.target.tagName === "BUTTON") return; event.preventDefault(); toggle(); }
@@ -325,6 +361,7 @@ function drawBodies(share) {
 
 function draw(at) {
   const dt = Math.min((at - drawnAt) / 1000, 0.05); drawnAt = at;
+  if (tape) play(dt);
   if (court && now) {
     if (!fit || fit.seat !== now.seat || fit.court !== court) { fit = frameOfView(); pointer = pointedAt = null; }
     predict(dt);
@@ -361,6 +398,7 @@ function words() {
   put($("rate"), `loop ${now.rate.toFixed(1)} Hz`);
   put($("watching"), now.watching ? `${now.watching} watching` : "");
   $("recording").hidden = !now.recording;
+  if (tape) { put($("pause"), tape.runs ? "Pause" : "Play"); seats(-1); $("notice").hidden = flash <= 0.3; if (flash > 0.3) show("Goal!", "", "", true); return; }
   const runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
   const free = now.seats.findIndex((s) => s.who === "person" && !s.taken);
   const say = sits || now.seats.every((s) => s.who !== "person");
@@ -410,7 +448,7 @@ function titleOf(i) {
 
 let panel = "";
 function seats(free) {
-  const can = now.phase === "lobby" || now.phase === "done";
+  const can = !tape && (now.phase === "lobby" || now.phase === "done");
   const state = JSON.stringify([now.seats, now.seat, can, free]);
   if (state === panel) return;
   if (document.activeElement && document.activeElement.closest && document.activeElement.closest("#seats")) return; // being chosen
@@ -437,5 +475,5 @@ function seats(free) {
 }
 
 resize();
-connect();
+begin();
 requestAnimationFrame(draw);
