@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
-from marl_airhockey.state import Bodies
+import numpy as np
+
+from marl_airhockey.state import Array, Bodies
 from marl_airhockey.table import Seat, Table
 
 
@@ -69,6 +71,15 @@ class Cast:
             length = float(((end - start) ** 2).sum() ** 0.5)
             if mouth.width is not None and not 0 < mouth.width < length:
                 raise ValueError(f"cast.mouths: {mouth.name!r} is wider than its side")
+
+    def opening(self, mouth: Mouth) -> Array:
+        """(2, 2) ends of a mouth, in the order of its side's, m."""
+        start, end = self.table.ends(mouth.side)
+        if mouth.width is None:
+            return np.array([start, end])
+        along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
+        middle = (start + end) / 2
+        return np.array([middle - along, middle + along])
 
     @cached_property
     def bodies(self) -> Bodies:

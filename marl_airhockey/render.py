@@ -99,12 +99,8 @@ def _table(canvas: Canvas, scene: Scene) -> None:
         owner = sides.index(mouth.side) if mouth.side in sides else 0
         if mouth.width is None or (any(scene.retired) and scene.retired[owner]):
             continue
-        start, end = table.ends(mouth.side)
-        along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
-        middle, out = (start + end) / 2, -0.04 * table.normals[mouth.side]
-        gap = np.array(
-            [middle - along, middle + along, middle + along + out, middle - along + out]
-        )
+        near, out = cast.opening(mouth), -0.04 * table.normals[mouth.side]
+        gap = np.array([*near, *(near + out)[::-1]])
         canvas.polygon(gap, _pale(_seat_colour(cast, owner), 0.55))
 
 

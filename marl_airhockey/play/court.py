@@ -255,7 +255,7 @@ class Court:
                 {
                     "side": mouth.side,
                     "owner": sides.index(mouth.side) if mouth.side in sides else -1,
-                    "ends": _rounded(_mouth_ends(table, mouth)),
+                    "ends": _rounded(cast.opening(mouth)),
                 }
                 for mouth in cast.mouths
                 if mouth.width is not None
@@ -277,13 +277,6 @@ class Court:
 
 def _is(driver: Driver, kind: str) -> bool:
     return type(driver).__module__.endswith(f".{kind}")
-
-
-def _mouth_ends(table: Any, mouth: Any) -> Array:
-    start, end = table.ends(mouth.side)
-    along = (end - start) / np.linalg.norm(end - start) * mouth.width / 2
-    middle = (start + end) / 2
-    return np.array([middle - along, middle + along])
 
 
 def _rounded(values: Array) -> Any:

@@ -180,7 +180,8 @@ function gamepad() {
   return [Math.max(-1, Math.min(1, a[0])), Math.max(-1, Math.min(1, a[1]))];
 }
 
-canvas.addEventListener("pointermove", aim);
+// Raw updates come at once; others wait for the next picture.
+canvas.addEventListener("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", aim);
 canvas.addEventListener("pointerdown", (event) => { aim(event); canvas.focus(); });
 function toggle() {
   if (tape) { if (!tape.runs && tape.at >= tape.steps.length - 1) tape.at = 0; tape.runs = !tape.runs; return; }
@@ -220,7 +221,7 @@ function resize() {
   canvas.height = Math.round(canvas.clientHeight * dense);
   fit = null;
 }
-addEventListener("resize", resize);
+new ResizeObserver(resize).observe(canvas);
 
 function frameOfView() {
   const turn = court.seats[now && now.seat !== null ? now.seat : 0].turn;
@@ -287,7 +288,7 @@ function drawTable() {
   path(corners); pen.strokeStyle = inks.rail; pen.lineWidth = 0.08 * fit.scale; pen.stroke();
   pen.fillStyle = inks.field; pen.fill();
   pen.lineWidth = Math.max(1, 0.004 * fit.scale);
-  if (count === 4) {
+  if (count === 4 && new Set(court.seats.map((s) => s.side)).size <= 2) {
     const half = Math.abs(corners[0][1]), long = Math.abs(corners[0][0]);
     pen.strokeStyle = inks.faint;
     for (const x of [-long / 2, long / 2]) { path([[x, -half], [x, half]], false); pen.stroke(); }
