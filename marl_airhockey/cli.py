@@ -36,6 +36,9 @@ from marl_airhockey.registry import make_driver
 FLOORS = ("still", "random", "sticky")
 app.command()(cli_games.league)
 app.command()(cli_play.play)
+record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
+record.command()(cli_play.report)
+app.add_typer(record, name="record")
 
 
 @app.command("list")

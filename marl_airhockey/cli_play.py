@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from marl_airhockey.cli_common import Backend, Options, Profile, console, settings
+from marl_airhockey.cli_common import (
+    AsJson,
+    Backend,
+    Options,
+    Profile,
+    console,
+    settings,
+)
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
 from marl_airhockey.registry import zoo_names
@@ -90,6 +97,26 @@ def show(recording: Path, host: str, port: int, browser: bool) -> None:
     from marl_airhockey.play.server import replay
 
     _host(lambda door: replay(recording, door), recording.name, host, port, browser)
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="Of recordings.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the report; the recordings' own.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Sum recordings up: results, reactions, shots, time at limits, with intervals."""
+    need("matplotlib", "train")
+    from marl_airhockey.play.report import report as sum_up
+
+    found = sum_up(folder)
+    files = found.save(out or folder)
+    if as_json:
+        console.print_json(files[0].read_text())
+        return
+    console.print(files[1].read_text(), markup=False, soft_wrap=True)
+    console.print("files:", *files, soft_wrap=True)
 
 
 def _host(

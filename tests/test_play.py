@@ -22,6 +22,7 @@ from marl_airhockey.play.court import RATE, Court, Fairness
 from marl_airhockey.play.film import film
 from marl_airhockey.play.protocol import BURST, LARGEST, Meter, parse
 from marl_airhockey.play.recorder import Recorder, read
+from marl_airhockey.play.report import _comes, _reactions, report
 from marl_airhockey.play.session import IDLE, Session
 from marl_airhockey.registry import scenario_names
 
@@ -250,6 +251,60 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
     path.write_text("nothing")
     with pytest.raises(ValueError, match="no recording"):
         read(path)
+
+
+def test_recordings_become_a_report(tmp_path):
+    for seed in range(3):
+        seats = {"paddle_0": "person", "paddle_1": "striker:strength=fair"}
+        options = {"options": {"seconds": 6.0}}
+        court = Court("duel", seats, options, seed=seed)
+        session = Session(court, Recorder(tmp_path))
+        guest = session.join()
+        session.hear(guest, line("hello", key="alice"))
+        session.hear(guest, line("start"))
+        while court.phase != "done":
+            _, y = court.world.state.puck[0, 0]
+            guest.meter = Meter(time.monotonic())
+            session.hear(guest, aim(-0.6, float(y)))
+            session.tick()
+    court.start()
+    for _ in range(4 * RATE):
+        session.tick()
+    session.recorder.end(court, "a player has left")
+    found = report(tmp_path)
+    assert found.episodes == 4
+    assert found.broken_off == 1
+    person = found.players[guest.name]
+    assert person.person
+    assert person.games == 3 == found.players["striker:strength=fair"].games
+    assert len(found.games) == 3
+    assert person.steps > 3 * 6 * RATE
+    assert found.players["striker:strength=fair"].shots
+    files = found.save(tmp_path / "out")
+    assert all(path.stat().st_size > 100 for path in files)
+    data = json.loads(files[0].read_text())
+    assert {row["player"] for row in data["players"]} == set(found.players)
+    with pytest.raises(ValueError, match="no recordings"):
+        report(tmp_path / "out")
+
+
+def test_reactions_and_met_pucks_are_measured_right():
+    n, dt = 120, 1 / RATE
+    place = np.zeros((n, 2))
+    place[:20] = (0.8, 0.0)
+    place[20:, 0] = -0.5 * dt * np.arange(n - 20)
+    motion = np.zeros((n, 2))
+    motion[20:, 0] = -0.5
+    speed = np.zeros(n)
+    speed[20 + 15 :] = 0.5
+    assert list(_reactions(place, motion, speed, dt)) == [pytest.approx(0.25)]
+    speed[:] = 0.5
+    assert list(_reactions(place, motion, speed, dt)) == [], "who moves does not react"
+    hits = np.zeros(n, bool)
+    hits[90] = True
+    motion[90:, 0] = 1.0
+    assert list(_comes(place, motion, hits)) == [True]
+    assert list(_comes(place, motion, hits & False)) == [False]
 
 
 @contextlib.contextmanager

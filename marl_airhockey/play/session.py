@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import json
 import secrets
 import time
@@ -25,7 +26,7 @@ class Guest:
 
     def __init__(self) -> None:
         self.name = secrets.token_hex(4)
-        """Pseudonym; of nobody's choosing."""
+        """Pseudonym: the same for all games of a page, known to nobody."""
         self.key = ""
         self.seat: int | None = None
         self.seen = 0
@@ -75,7 +76,7 @@ class Session:
         getattr(self, f"_on_{kind}")(guest, **fields)
 
     def _on_hello(self, guest: Guest, key: str) -> None:
-        guest.key = key
+        guest.key, guest.name = key, hashlib.sha256(key.encode()).hexdigest()[:8]
         seat, _ = self._kept.pop(key, (None, 0.0))
         if seat is not None and seat in self.free:
             self._take(guest, seat)

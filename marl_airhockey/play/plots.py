@@ -1,0 +1,65 @@
+"""The picture of a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from marl_airhockey.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.play.report import Player, Report
+
+MOST = 4
+"""Players whose distributions are drawn."""
+
+
+def picture(report: Report, path: Path) -> None:
+    """Scores, reactions, speed and placement of shots, as a PNG."""
+    ranked = sorted(report.players.values(), key=lambda p: (not p.person, -p.games))
+    shown = list(zip(ranked, (INK, *INKS), strict=False))[:MOST]
+    figure, grid = plt.subplots(2, 2, figsize=(9, 6), dpi=DPI, layout="constrained")
+    _scores(grid[0, 0], report)
+    panels = (
+        (grid[0, 1], "reactions", "ms from a serve to the first movement", 1000.0),
+        (grid[1, 0], "shots", "speed of shots, m/s", 1.0),
+        (grid[1, 1], "places", "where shots would arrive, m aside", 1.0),
+    )
+    for axes, name, label, scale in panels:
+        _distributions(axes, name, label, scale, shown)
+    save(figure, path)
+
+
+def _scores(axes: Axes, report: Report) -> None:
+    rows = [row for row in report.rows() if row["games"]][::-1]
+    for k, row in enumerate(rows):
+        middle, low, high = row["score"]
+        ink = INK if row["person"] else INKS[0]
+        axes.plot([low, high], [k, k], color=ink, linewidth=2)
+        axes.plot(middle, k, "o", color=ink)
+    axes.set_yticks(range(len(rows)), [row["player"] for row in rows])
+    axes.axvline(0.5, color=INKS[0], linestyle=":", linewidth=1)
+    axes.set(xlim=(-0.02, 1.02), xlabel="score: win + draw / 2 (95 %)")
+    tidy(axes, legend=None)
+
+
+def _distributions(
+    axes: Axes,
+    name: str,
+    label: str,
+    scale: float,
+    players: list[tuple[Player, str]],
+) -> None:
+    drawn = False
+    for player, ink in players:
+        values = scale * np.sort(getattr(player, name))
+        if len(values) < 2:
+            continue
+        share = (np.arange(len(values)) + 0.5) / len(values)
+        axes.plot(values, share, color=ink, label=f"{player.name} ({len(values)})")
+        drawn = True
+    axes.set(xlabel=label, ylabel="share at most this", ylim=(0, 1))
+    if not drawn:
+        axes.text(0.5, 0.5, "seen too seldom", transform=axes.transAxes, ha="center")
+    tidy(axes, "best" if drawn else None)

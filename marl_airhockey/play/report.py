@@ -1,0 +1,297 @@
+"""What recordings say about players: results, reactions, shots, limits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.limits import EXCESS
+from marl_airhockey.play.recorder import read
+from marl_airhockey.state import Array
+from marl_airhockey.stats import bootstrap, elo, interval, iqm
+
+MOVES = 0.1
+"""m/s: a faster paddle moves."""
+COMES = 0.1
+"""m/s: a puck that nears one's own end faster comes."""
+LONGEST = 1.5
+"""s after a serve within which a movement counts as the reaction to it."""
+COMPLETE = "played to the end"
+"""How a recording ends whose game was not broken off."""
+RESAMPLES = 400
+
+
+@dataclass
+class Player:
+    """All that was seen of somebody, over all episodes."""
+
+    name: str
+    person: bool
+    won: int = 0
+    drawn: int = 0
+    lost: int = 0
+    comes: list[bool] = field(default_factory=list)
+    """Of every puck that came: whether it was met."""
+    reactions: list[float] = field(default_factory=list)
+    """s from a serve to the first movement"""
+    shots: list[float] = field(default_factory=list)
+    """m/s of pucks that left the paddle toward the other end"""
+    places: list[float] = field(default_factory=list)
+    """m aside of the middle at which they would reach the other end, banks included"""
+    steps: int = 0
+    limited: int = 0
+    """Steps in which what was asked exceeded speed, acceleration or reach"""
+    delays: list[float] = field(default_factory=list)
+    """ms, round trips of the page"""
+
+    @property
+    def games(self) -> int:
+        """That were played to the end."""
+        return self.won + self.drawn + self.lost
+
+
+@dataclass
+class Report:
+    """Players by name, and the games between them."""
+
+    players: dict[str, Player]
+    games: list[tuple[str, str, float]]
+    """Two players and the first one's score"""
+    episodes: int
+    broken_off: int
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row a player, those with most games first; nan where nothing was seen."""
+        ratings = self._ratings()
+        ranked = sorted(self.players.values(), key=lambda p: (-p.games, p.name))
+        return [
+            {
+                "player": p.name,
+                "person": p.person,
+                "games": p.games,
+                "score": _share(p.won + 0.5 * p.drawn, p.games),
+                "elo": ratings.get(p.name, [float("nan")] * 3),
+                "hit_rate": _share(sum(p.comes), len(p.comes)),
+                "reaction_ms": [1000 * x for x in _middle(p.reactions)],
+                "shot_speed": _middle(p.shots),
+                "shot_spread": float(np.std(p.places)) if p.places else float("nan"),
+                "limited": p.limited / p.steps if p.steps else float("nan"),
+                "round_trip_ms": _middle(p.delays)[0],
+            }
+            for p in ranked
+        ]
+
+    def _ratings(self) -> dict[str, list[float]]:
+        """Elo of each player with its 95 % interval, games resampled."""
+        names = sorted({name for a, b, _ in self.games for name in (a, b)})
+        if len(names) < 2:
+            return {}
+        rng = np.random.default_rng(0)
+        count = len(self.games)
+
+        def rate(chosen: Array) -> Array:
+            score, played = np.zeros((2, len(names), len(names)))
+            for k in chosen:
+                a, b, share = self.games[k]
+                i, j = names.index(a), names.index(b)
+                score[i, j] += share
+                score[j, i] += 1.0 - share
+                played[i, j] += 1
+                played[j, i] += 1
+            return elo(score, played)
+
+        middle = rate(np.arange(count))
+        drawn = [rate(rng.integers(0, count, count)) for _ in range(RESAMPLES)]
+        low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
+        return {
+            name: [float(middle[i]), float(low[i]), float(high[i])]
+            for i, name in enumerate(names)
+        }
+
+    def to_markdown(self) -> str:
+        """A table."""
+        lines = [
+            f"# {self.episodes} recorded episodes, {self.broken_off} broken off",
+            "",
+            "| player | games | score (95 %) | Elo (95 %) | pucks met (95 %) "
+            "| reaction, ms (95 %) | shot, m/s (95 %) | spread of shots, m "
+            "| at limits | round trip, ms |",
+            "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        ]
+        for row in self.rows():
+            lines.append(
+                f"| {row['player']} | {row['games']} | {_shown(row['score'], 2)} "
+                f"| {_shown(row['elo'], 0)} | {_shown(row['hit_rate'], 2)} "
+                f"| {_shown(row['reaction_ms'], 0)} | {_shown(row['shot_speed'], 2)} "
+                f"| {row['shot_spread']:.3f} | {row['limited']:.2f} "
+                f"| {row['round_trip_ms']:.0f} |"
+            )
+        lines += [
+            "",
+            "Score: win + draw / 2, of games played to the end. Reaction: from a serve "
+            f"to the first movement above {MOVES} m/s. Shots: pucks that left the "
+            "paddle toward the other end; their interquartile mean speed, and the "
+            "deviation of where they would reach that end. At limits: share of the "
+            "steps in which what was asked exceeded speed, acceleration or reach.",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write ``report.json``, ``report.md`` and ``report.png``."""
+        from marl_airhockey.play.plots import picture
+
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [folder / f"report.{kind}" for kind in ("json", "md", "png")]
+        data = {"episodes": self.episodes, "broken_off": self.broken_off}
+        rows = [{k: _plain(v) for k, v in row.items()} for row in self.rows()]
+        files[0].write_text(json.dumps({**data, "players": rows}, indent=1))
+        files[1].write_text(self.to_markdown())
+        picture(self, files[2])
+        return files
+
+
+def report(folder: Path) -> Report:
+    """Read all recordings of a folder.
+
+    Raises:
+        ValueError: there is none, or a file that is no recording.
+    """
+    paths = sorted(folder.glob("*.jsonl"))
+    if not paths:
+        raise ValueError(f"{folder}: there are no recordings (*.jsonl) in it")
+    found = Report({}, [], len(paths), 0)
+    for path in paths:
+        _add(found, *read(path))
+    return found
+
+
+def _add(
+    found: Report,
+    meta: dict[str, Any],
+    steps: list[dict[str, Any]],
+    end: dict[str, Any],
+) -> None:
+    """Take an episode into a report."""
+    seats, players = meta["court"]["seats"], []
+    for row in meta["players"]:
+        name = row["person"] or (
+            "nobody" if row["driver"] == "person" else row["driver"]
+        )
+        known = found.players.setdefault(name, Player(name, row["person"] is not None))
+        players.append(known)
+    complete = end.get("reason") == COMPLETE
+    found.broken_off += not complete
+    teams = [seat["team"] for seat in seats]
+    if complete and len(set(teams)) > 1:
+        _result(found, players, teams, end["success"])
+    for i, player in enumerate(players):
+        _watch(player, i, seats[i], meta, steps)
+
+
+def _result(
+    found: Report, players: Sequence[Player], teams: Sequence[int], won: Sequence[bool]
+) -> None:
+    anybody = any(won)
+    for i, player in enumerate(players):
+        player.won += won[i]
+        player.drawn += not anybody
+        player.lost += anybody and not won[i]
+        for j in range(i + 1, len(players)):
+            if teams[i] != teams[j] and won[i] + won[j] < 2:
+                share = 0.5 + 0.5 * (won[i] - won[j])
+                found.games.append((player.name, players[j].name, share))
+
+
+def _watch(
+    player: Player,
+    i: int,
+    seat: dict[str, Any],
+    meta: dict[str, Any],
+    steps: list[dict[str, Any]],
+) -> None:
+    """Measure a player at a seat in an episode."""
+    bound = [EXCESS.index(name) for name in ("speed", "acceleration", "reach")]
+    for row in steps:
+        player.steps += 1
+        player.limited += any(row["excess"][i][k] > 0 for k in bound)
+        if row["delays"][i] is not None:
+            player.delays.append(row["delays"][i])
+    if not steps or not steps[0]["pucks"]:
+        return
+    turn = np.array(seat["turn"])
+    pucks = np.array([row["pucks"] for row in steps])
+    place, motion = pucks[..., :2] @ turn.T, pucks[..., 2:] @ turn.T
+    speed = np.hypot(*np.array([row["pad_velocities"][i] for row in steps]).T)
+    corners = np.array(meta["court"]["table"]) @ turn.T
+    far, half = corners[:, 0].max(), corners[:, 1].max() - meta["court"]["puck"]
+    for k in range(pucks.shape[1]):
+        hits = np.array([["hit", i, k] in row["events"] for row in steps])
+        player.comes += _comes(place[:, k], motion[:, k], hits)
+        for n in np.flatnonzero(hits & (motion[:, k, 0] > COMES)):
+            x, y = place[n, k]
+            vx, vy = motion[n, k]
+            player.shots.append(float(np.hypot(vx, vy)))
+            aside = y + vy * (far - x) / vx
+            folded = half - abs((aside + half) % (4 * half) - 2 * half)
+            player.places.append(float(folded))
+        dt = meta["control_dt"]
+        player.reactions += _reactions(place[:, k], motion[:, k], speed, dt)
+
+
+def _comes(place: Array, motion: Array, hits: Array) -> Iterator[bool]:
+    """Of every time that a puck came into one's own half: whether it was met."""
+    coming = False
+    for n in range(len(place)):
+        near = place[n, 0] < 0.0 and motion[n, 0] < -COMES
+        if not coming and near and not hits[n]:
+            coming = True
+        elif coming and hits[n]:
+            coming = False
+            yield True
+        elif coming and motion[n, 0] > COMES:
+            coming = False  # it came back from the wall by itself, or was served anew
+            yield False
+
+
+def _reactions(place: Array, motion: Array, speed: Array, dt: float) -> Iterator[float]:
+    """From each serve toward a player who stands still to the first movement, s."""
+    jump = np.hypot(*np.diff(place, axis=0, prepend=place[:1] + 1.0).T) > 0.1
+    served = jump & (np.hypot(*place.T) < 0.15) & (motion[:, 0] < -COMES)
+    for n in np.flatnonzero(served):
+        after = speed[n : n + round(LONGEST / dt)]
+        if after[0] < MOVES and (after >= MOVES).any():
+            yield float(np.argmax(after >= MOVES) * dt)
+
+
+def _plain(value: Any) -> Any:
+    """For JSON, which has no nan."""
+    if isinstance(value, list):
+        return [_plain(x) for x in value]
+    return None if isinstance(value, float) and np.isnan(value) else value
+
+
+def _share(part: float, whole: int) -> list[float]:
+    """A share with its 95 % interval."""
+    if not whole:
+        return [float("nan")] * 3
+    return [part / whole, *interval(part / whole, whole)]
+
+
+def _middle(values: Sequence[float]) -> list[float]:
+    """An interquartile mean with its 95 % interval."""
+    if not len(values):
+        return [float("nan")] * 3
+    rows = np.array(values)
+    return [iqm(rows), *bootstrap(rows, iqm, resamples=RESAMPLES)]
+
+
+def _shown(values: Sequence[float], digits: int) -> str:
+    middle, low, high = values
+    if np.isnan(middle):
+        return "-"
+    return f"{middle:.{digits}f} ({low:.{digits}f}..{high:.{digits}f})"
