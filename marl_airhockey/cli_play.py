@@ -42,7 +42,7 @@ def play(
         list[str] | None,
         typer.Option(help="Who sits at one seat, AGENT=NAME; person for people."),
     ] = None,
-    backend: Backend = "batched",
+    backend: Backend = "pymunk",
     profile: Profile = "ideal",
     option: Options = None,
     reaction: Annotated[
@@ -84,6 +84,8 @@ def play(
         court.seat(i, chosen.pop(agent, PERSON if i == 0 else rest))
     if chosen:
         raise ValueError(f"--seat: {scenario} has no {', '.join(chosen)}")
+    with console.status("preparing the table (longer when it is the first time)"):
+        court.rehearse()
     session = Session(court, Recorder(record) if record else None)
     _host(lambda door: application(session, door), scenario, host, port, browser)
     if session.failure is not None:

@@ -203,6 +203,18 @@ def test_a_match_ends_and_another_begins():
     assert court.world.episode.number[0] == 2
 
 
+def test_a_rehearsal_leaves_no_trace():
+    fresh = Court("duel", {"paddle_0": "striker", "paddle_1": "zoo/duel"}, {}, seed=4)
+    other = Court("duel", {"paddle_0": "striker", "paddle_1": "zoo/duel"}, {}, seed=4)
+    other.rehearse()
+    for court in (fresh, other):
+        court.start()
+        for _ in range(6 * RATE):
+            court.tick()
+    assert fresh.state() == other.state()
+    assert fresh.number == other.number == 1
+
+
 def test_fair_opponents_act_late_and_slowly():
     def first_move(fairness):
         seats = {"paddle_0": "striker", "paddle_1": "still"}

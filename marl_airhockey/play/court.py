@@ -150,6 +150,14 @@ class Court:
         for i in seats:
             self._driven[i].start(one, world.seeds, world.episode.number)
 
+    def rehearse(self) -> None:
+        """Play half a second for nobody, so that all loops are compiled by then."""
+        for _ in range(RATE // 2):
+            self._step()
+        self.world.reset(int(self.world.seeds[0]))
+        self.phase, self.number = "lobby", 0
+        self._begin()
+
     def start(self) -> None:
         """Begin a match, or go on with a paused one."""
         if self.phase == "pause":
