@@ -128,7 +128,7 @@ def test_statistics_of_runs():
 
 
 GAME = {**SMALL, "num_worlds": 32, "batch_size": 256, "n_steps": 16, "snapshots": 4}
-GAME |= {"options": {"seconds": 3.0}, "eval_episodes": 4, "pool": 2}
+GAME |= {"options": {"seconds": 3.0}, "eval_episodes": 4, "pool": 2, "mirror": 0.5}
 GAME |= {"total_steps": 6144, "opponents": ["random", "goalkeeper"]}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,6 +15,7 @@ from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.registry import agent_names, make_agent, make_driver, zoo_names
 from marl_airhockey.seats import Driven
 from marl_airhockey.state import Array
+from marl_airhockey.table import Seat
 
 RATE = 60
 """Ticks, and control steps, per second."""
@@ -85,7 +87,7 @@ class Court:
         self._begin()
 
     @property
-    def seats(self) -> tuple[Any, ...]:
+    def seats(self) -> tuple[Seat, ...]:
         """The seats of the cast."""
         return self.cast.seats
 
@@ -145,7 +147,7 @@ class Court:
         self.number += 1
         self._start_drivers(range(len(self.seats)))
 
-    def _start_drivers(self, seats: Any) -> None:
+    def _start_drivers(self, seats: Iterable[int]) -> None:
         one, world = np.zeros(1, np.int64), self.world
         for i in seats:
             self._driven[i].start(one, world.seeds, world.episode.number)

@@ -27,6 +27,8 @@ WEB = Path(__file__).parent / "web"
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
 STALLED = 10.0
 """s after which a page that takes no frame is cut off."""
+MOST = 200
+"""Pages at once."""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -111,6 +113,9 @@ def application(session: Session, door: Door) -> Starlette:
         reason = door.refuses(socket)
         if reason is not None:
             await socket.close(1008, reason)
+            return
+        if len(session.guests) >= MOST:
+            await socket.close(1013, "too many are watching")
             return
         await socket.accept()
         guest = session.join()
