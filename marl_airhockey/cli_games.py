@@ -42,7 +42,7 @@ def league(
     folder: Annotated[
         Path | None, typer.Option(help="Every policy and run in it plays, too.")
     ] = None,
-    games: Annotated[int, typer.Option(help="Of each pair.")] = 100,
+    games: Annotated[int, typer.Option(help="Of each pair.", min=2)] = 100,
     out: Annotated[Path, typer.Option(help="Folder of table and picture.")] = Path(
         "runs/league"
     ),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 import threading
 import webbrowser
 from collections.abc import Callable
@@ -20,7 +22,6 @@ from marl_airhockey.cli_common import (
 )
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
-from marl_airhockey.registry import zoo_names
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from marl_airhockey.play.server import Door
 
 Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
-Port = Annotated[int, typer.Option(help="0 for a free one.")]
+Port = Annotated[int, typer.Option(help="0 for a free one.", min=0, max=65535)]
 Browser = Annotated[bool, typer.Option(help="Open the page.")]
 
 
@@ -46,13 +47,20 @@ def play(
     profile: Profile = "ideal",
     option: Options = None,
     reaction: Annotated[
-        float, typer.Option(help="ms by which programs act late, 0 to 300.")
+        float,
+        typer.Option(help="ms by which programs act late.", min=0.0, max=300.0),
     ] = 0.0,
     noise: Annotated[
-        float, typer.Option(help="Noise on what programs ask, of top speed.")
+        float,
+        typer.Option(
+            help="Noise on what programs ask, of top speed.", min=0.0, max=1.0
+        ),
     ] = 0.0,
     pace: Annotated[
-        float, typer.Option(help="Largest speed of programs, of top speed.")
+        float,
+        typer.Option(
+            help="Largest speed of programs, of top speed.", min=0.05, max=1.0
+        ),
     ] = 1.0,
     record: Annotated[
         Path | None, typer.Option(help="Write every episode into this folder.")
@@ -76,8 +84,7 @@ def play(
     }
     fairness = Fairness(reaction / 1000.0, noise, pace)
     court = Court(scenario, {}, keywords, fairness)
-    usual = f"zoo/{scenario}"
-    rest = opponent or (usual if usual in zoo_names() else "allround")
+    rest = opponent or next(iter(court.house), "allround")
     chosen = {str(k): str(v) for k, v in settings(seat).items()}
     for i in range(len(court.who)):
         agent = f"paddle_{i}"
@@ -106,13 +113,16 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the report; the recordings' own.")
     ] = None,
+    scenario: Annotated[
+        str | None, typer.Option("--scenario", "-s", help="Of this one alone.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Sum recordings up: results, reactions, shots, time at limits, with intervals."""
     need("matplotlib", "train")
     from marl_airhockey.play.report import report as sum_up
 
-    found = sum_up(folder)
+    found = sum_up(folder, scenario)
     files = found.save(out or folder)
     if as_json:
         console.print_json(files[0].read_text())
@@ -140,4 +150,13 @@ def _host(
 
 
 def _shown(host: str) -> str:
+    """A host as others can open it."""
+    if host == "0.0.0.0":
+        with (
+            contextlib.suppress(OSError),
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
+        ):
+            # Sends nothing: it only asks which of our addresses would be used.
+            probe.connect(("192.0.2.1", 9))
+            return str(probe.getsockname()[0])
     return f"[{host}]" if ":" in host else host

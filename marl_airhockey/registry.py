@@ -138,4 +138,8 @@ def _build(
     for option in options:
         if option not in known:
             raise ValueError(unknown(what, option, known))
+    try:
+        inspect.signature(make).bind(**options)
+    except TypeError as error:
+        raise ValueError(f"{what}: {error}") from error
     return make(**options)

@@ -149,7 +149,7 @@ def main(
             pages = [browser.new_page(viewport=size) for browser in browsers]
             for page in pages:
                 page.goto(address)
-                page.locator("#go").wait_for()
+                page.wait_for_function("window.airhockey.frames.length > 9")
             Watchers(address, crowd)
             pages[0].keyboard.press("Space")
             time.sleep(5.0)

@@ -114,7 +114,7 @@ def test_a_pointer_moves_its_paddle_and_stays_within_the_limits():
 
 
 def test_a_stick_is_a_velocity():
-    court = Court("duel", {}, {}, seed=1)
+    court = Court("duel", {"paddle_1": "still"}, {}, seed=1)
     session = Session(court)
     guest = session.join()
     session.hear(guest, line("hello", key="k"))
@@ -142,6 +142,12 @@ def test_two_people_and_a_watcher():
         session.hear(guest, line("hello", key=str(i)))
     assert [guest.seat for guest in guests] == [0, 1, None]
     watcher = guests[2]
+    session.part(guests[1])
+    session.hear(guests[0], line("start"))
+    assert court.phase == "lobby", "a seat of people is free"
+    guests[1] = session.join()
+    session.hear(guests[1], line("hello", key="1"))
+    assert guests[1].seat == 1
     for text in (line("start"), line("swap"), aim(0, 0), line("sit", seat=0)):
         session.hear(watcher, text)
     assert court.phase == "lobby"
@@ -157,6 +163,15 @@ def test_two_people_and_a_watcher():
     session.hear(back, line("hello", key="0"))
     assert back.seat == 0, "a page that is loaded again gets its seat back"
     assert court.phase == "countdown"
+    session.hear(back, line("pause"))
+    session.part(back)
+    back = session.join()
+    session.hear(back, line("hello", key="0"))
+    assert court.phase == "pause", "who paused goes on when they want"
+    session.hear(back, line("stop"))
+    assert court.phase == "done"
+    session.hear(back, line("swap"))
+    assert court.phase == "lobby"
 
 
 def test_an_idle_page_lets_go_of_its_seat():
@@ -188,8 +203,56 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
     assert court.who[0] == "allround:strength=weak", "not during a match"
     with pytest.raises(ValueError, match="unknown driver"):
         Court("duel", {"paddle_1": "nobody"}, {})
+    with pytest.raises(ValueError, match="say person"):
+        Court("duel", {"paddle_1": "mouse"}, {})
+    with pytest.raises(ValueError, match="path"):
+        Court("duel", {"paddle_1": "policy"}, {})
     with pytest.raises(ValueError, match="paddle_7"):
         Court("duel", {"paddle_7": "still"}, {})
+
+
+@pytest.mark.parametrize(
+    ("game", "keywords", "house"),
+    [
+        ("duel", {}, ["zoo/duel"]),
+        ("duel", {"options": {"pucks": 2}}, []),
+        (
+            "duel",
+            {"options": {"seats": "robot"}, "profile": "robot"},
+            ["zoo/duel_robot"],
+        ),
+        ("free_for_all", {"options": {"sides": 3}}, []),
+        ("juggle", {}, ["zoo/juggle"]),
+    ],
+)
+def test_the_house_offers_who_can_play(game, keywords, house):
+    court = Court(game, {}, keywords, seed=0)
+    assert court.house == house
+    for name in court.choices:
+        court.seat(0, name)
+    if not house:
+        with pytest.raises(ValueError, match="expects observations"):
+            court.seat(0, f"zoo/{game}")
+        assert court.who[0] == court.choices[-1], "who sat there still does"
+
+
+def test_a_match_whose_players_change_does_not_count(tmp_path):
+    court = Court("duel", {"paddle_1": "still"}, {}, seed=1)
+    session = Session(court, Recorder(tmp_path))
+    first = session.join()
+    session.hear(first, line("hello", key="a"))
+    session.hear(first, line("start"))
+    for _ in range(5 * RATE):
+        session.tick()
+    session.hear(first, line("leave"))
+    second = session.join()
+    session.hear(second, line("hello", key="b"))
+    session.hear(second, line("start"))
+    for _ in range(5 * RATE):
+        session.tick()
+    (path,) = tmp_path.iterdir()
+    _, _, end = read(path)
+    assert end["reason"] == "the players changed"
 
 
 def test_a_match_ends_and_another_begins():
@@ -260,6 +323,16 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
     film(path, tmp_path / "game.gif")
     with Image.open(tmp_path / "game.gif") as video:
         assert video.n_frames == RATE
+    rows = path.read_text().splitlines()
+    path.write_text("\n".join([rows[0], '{"kind":"step","n":1}']))
+    with pytest.raises(ValueError, match="line 2 lacks"):
+        read(path)
+    path.write_text(rows[0])
+    with pytest.raises(ValueError, match="no steps"):
+        film(path, tmp_path / "game.gif")
+    path.write_bytes(b"\xff\x00")
+    with pytest.raises(ValueError, match="cannot be read"):
+        read(path)
     path.write_text("nothing")
     with pytest.raises(ValueError, match="no recording"):
         read(path)
@@ -418,7 +491,7 @@ def test_strangers_are_kept_out():
         asyncio.run(cross_site())
     with served("duel", "--opponent", "still", "--host", "0.0.0.0") as (address, _):
         assert "token=" in address
-        near = address.replace("0.0.0.0", "127.0.0.1")
+        near = re.sub(r"//[^:]+", "//127.0.0.1", address)
         assert b"canvas" in urllib.request.urlopen(near).read()
         for link in (near.partition("?")[0], near[:-3] + "abc"):
             with pytest.raises(urllib.error.HTTPError, match="403"):
@@ -453,6 +526,12 @@ def test_a_taken_port_is_named():
         )
     assert done.returncode == 1
     assert f"--port {port}" in done.stderr
+    for bad in (["--port", "99999"], ["--reaction", "900"], ["--opponent", "policy"]):
+        done = subprocess.run(
+            [*command, *bad], capture_output=True, text=True, check=False
+        )
+        assert done.returncode in (1, 2)
+        assert "Traceback" not in done.stderr
 
 
 @pytest.fixture(scope="module")

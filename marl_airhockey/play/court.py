@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
 from marl_airhockey.driver import Driver
 from marl_airhockey.episode import Step
+from marl_airhockey.frozen import Frozen
 from marl_airhockey.handicap import Handicap
 from marl_airhockey.make import Keywords, build_world
-from marl_airhockey.registry import agent_names, make_agent, make_driver, zoo_names
+from marl_airhockey.registry import (
+    ZOO,
+    agent_names,
+    make_agent,
+    make_driver,
+    make_scenario,
+    zoo_names,
+)
 from marl_airhockey.seats import Driven
 from marl_airhockey.state import Array
 from marl_airhockey.table import Seat
@@ -21,6 +30,8 @@ RATE = 60
 """Ticks, and control steps, per second."""
 COUNTDOWN = 3.0
 """s before the puck is free."""
+RESUME = 1.5
+"""s before a paused match goes on."""
 PERSON = "person"
 """What a seat is called that people take."""
 Phase = Literal["lobby", "countdown", "play", "pause", "done"]
@@ -74,7 +85,7 @@ class Court:
                 raise ValueError(
                     f"seat {agent!r} is unknown; {scenario} has {', '.join(agents)}"
                 )
-        self.who = [seats.get(agent, PERSON) for agent in agents]
+        self.who = [PERSON for _ in agents]
         self._hands: list[Driver] = [make_agent("mouse") for _ in agents]
         self._driven = [self._sit(i) for i in range(len(agents))]
         self.phase: Phase = "lobby"
@@ -85,6 +96,8 @@ class Court:
         self._turns = np.array([self.cast.table.rotation(s.side) for s in self.seats])
         self.world.reset(seed)
         self._begin()
+        for agent, name in seats.items():
+            self.seat(agents.index(agent), name)
 
     @property
     def seats(self) -> tuple[Seat, ...]:
@@ -94,15 +107,31 @@ class Court:
     @property
     def choices(self) -> list[str]:
         """Who may be asked to play: scripts, and the zoo's policies for this game."""
-        game = self.world.scenario.name
         scripts = [n for n in agent_names() if n not in (*HANDS, "policy", "reacher")]
         strengths = [
             f"{name}:strength={strength}"
             for name in ("allround", "striker", "goalkeeper")
             for strength in ("weak", "fair")
         ]
-        mine = [n for n in zoo_names() if n == f"zoo/{game}"]
-        return [*mine, *scripts, *(strengths if len(self.seats) > 1 else [])]
+        return [*self.house, *scripts, *(strengths if len(self.seats) > 1 else [])]
+
+    @cached_property
+    def house(self) -> list[str]:
+        """The zoo's policies that can play this: same rules, seats and observations."""
+        scenario, observer = self.world.scenario, self.world.observer
+        found: list[tuple[bool, str]] = []
+        for name in zoo_names():
+            card = Frozen.load(ZOO / f"{name[4:]}.npz").card
+            labels = observer.prepare(card["observe"]).labels
+            kind = make_scenario(card["scenario"], **card["options"]).seats
+            if (card["scenario"], card["labels"], kind) == (
+                scenario.name,
+                list(labels),
+                scenario.seats,
+            ):
+                other = card["profile"] != self.keywords.get("profile", "ideal")
+                found.append((other, name))
+        return [name for _, name in sorted(found)]
 
     def _sit(self, i: int) -> Driven:
         """The driver of a seat as the world calls it."""
@@ -120,13 +149,23 @@ class Court:
         """
         if self.phase not in ("lobby", "done"):
             raise ValueError("seats change between matches")
-        before, self.who[i] = self.who[i], name
+        if name in HANDS:
+            raise ValueError(f"{name} is what a person steers with: say {PERSON}")
+        before, driven = self.who[i], self._driven[i]
+        self.who[i] = name
         try:
             self._driven[i] = self._sit(i)
+            self._start_drivers([i])
+            self._ask(i)  # A policy that does not fit says so here, not in a match.
         except ValueError:
-            self.who[i] = before
+            self.who[i], self._driven[i] = before, driven
             raise
-        self._start_drivers([i])
+        if self.phase == "done":
+            self.world.reset()
+            self._begin()
+            self.phase, self.reason = "lobby", ""
+        else:
+            self._start_drivers([i])
 
     def hand(self, i: int, kind: str) -> Driver:
         """What a person steers a seat with: "mouse" or "gamepad"."""
@@ -163,9 +202,9 @@ class Court:
     def start(self) -> None:
         """Begin a match, or go on with a paused one."""
         if self.phase == "pause":
-            self.phase = "countdown" if self.left > 0 else "play"
+            self.phase, self.left = "countdown", max(self.left, RESUME)
         elif self.phase in ("lobby", "done"):
-            if self.phase == "done" or self.ticks:
+            if self.phase == "done":
                 self.world.reset()
                 self._begin()
             self.phase, self.left = "countdown", COUNTDOWN
@@ -193,16 +232,18 @@ class Court:
         self._step()
         return True
 
+    def _ask(self, i: int) -> Array:
+        """What the driver of a seat wants now, (1, 2)."""
+        world = self.world
+        return self._driven[i].act(
+            world.sensed, world.memory, world.episode.physics, world.episode.cycles
+        )
+
     def _step(self) -> None:
         world = self.world
         actions = np.zeros((1, len(self.seats), 2))
-        for i, seat in enumerate(self._driven):
-            actions[:, i] = seat.act(
-                world.sensed,
-                world.memory,
-                world.episode.physics,
-                world.episode.cycles,
-            )
+        for i in range(len(self.seats)):
+            actions[:, i] = self._ask(i)
         self.result = world.step(actions)
         self.ticks += 1
         state = world.state

@@ -27,6 +27,8 @@ def film(recording: Path, video: Path, width: int = 640) -> None:
         ValueError: no recording, or a video that ends in neither .gif nor .mp4.
     """
     meta, steps, _ = read(recording)
+    if not steps:
+        raise ValueError(f"{recording}: there are no steps in it")
     name = meta["court"]["scenario"]
     scenario = make_scenario(name, **meta["options"])
     cast = scenario.cast

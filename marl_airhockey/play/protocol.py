@@ -18,6 +18,7 @@ MESSAGES: dict[str, dict[str, type]] = {
     "stick": {"x": float, "y": float, "q": int, "rtt": float},
     "start": {},
     "pause": {},
+    "stop": {},
     "swap": {},
     "sit": {"seat": int},
     "leave": {},

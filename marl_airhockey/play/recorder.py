@@ -20,6 +20,8 @@ import numpy as np
 from marl_airhockey.play.court import Court
 
 FORMAT = 1
+STEP = {"n", "time", "pads", "pucks", "events", "excess", "delays", "caption"}
+"""What readers need of every step."""
 SYNC = 1.0
 """s between two times that the file is forced onto the disk."""
 
@@ -28,7 +30,10 @@ class Recorder:
     """Writes the episodes of a court into a folder."""
 
     def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ValueError(f"--record {folder}: {error.strerror}") from error
         self._folder = folder
         self._file: TextIO | None = None
         self._synced = 0.0
@@ -116,13 +121,17 @@ class Recorder:
 def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
     """The meta line, the steps and the end ({} if it was cut off) of a recording.
 
-    A last line that is not whole is left out.
+    A last line that is not whole, and what follows one, is left out.
 
     Raises:
         ValueError: no recording, or one of another format.
     """
+    try:
+        lines = path.read_text().splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read as a recording: {error}") from error
     rows = []
-    for line in path.read_text().splitlines():
+    for line in lines:
         try:
             rows.append(json.loads(line))
         except json.JSONDecodeError:
@@ -131,6 +140,9 @@ def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, An
         raise ValueError(f"{path}: no recording of airhockey play")
     if rows[0].get("format") != FORMAT:
         raise ValueError(f"{path}: format {rows[0].get('format')}, expected {FORMAT}")
+    for number, row in enumerate(rows[1:], 2):
+        if row.get("kind") == "step" and not row.keys() >= STEP:
+            raise ValueError(f"{path}: line {number} lacks {sorted(STEP - row.keys())}")
     steps = [row for row in rows if row["kind"] == "step"]
     end = rows[-1] if rows[-1]["kind"] == "end" else {}
     return rows[0], steps, end

@@ -128,8 +128,8 @@ class Report:
                 f"| {row['player']} | {row['games']} | {_shown(row['score'], 2)} "
                 f"| {_shown(row['elo'], 0)} | {_shown(row['hit_rate'], 2)} "
                 f"| {_shown(row['reaction_ms'], 0)} | {_shown(row['shot_speed'], 2)} "
-                f"| {row['shot_spread']:.3f} | {row['limited']:.2f} "
-                f"| {row['round_trip_ms']:.0f} |"
+                f"| {_number(row['shot_spread'], 3)} | {_number(row['limited'], 2)} "
+                f"| {_number(row['round_trip_ms'], 0)} |"
             )
         lines += [
             "",
@@ -155,18 +155,25 @@ class Report:
         return files
 
 
-def report(folder: Path) -> Report:
-    """Read all recordings of a folder.
+def report(folder: Path, scenario: str | None = None) -> Report:
+    """Read all recordings of a folder, or those of one scenario.
 
     Raises:
-        ValueError: there is none, or a file that is no recording.
+        ValueError: there is none, a file that is no recording, or several scenarios.
     """
-    paths = sorted(folder.glob("*.jsonl"))
-    if not paths:
-        raise ValueError(f"{folder}: there are no recordings (*.jsonl) in it")
-    found = Report({}, [], len(paths), 0)
-    for path in paths:
-        _add(found, *read(path))
+    if not folder.is_dir():
+        raise ValueError(f"{folder}: there is no such folder")
+    read_ones = [read(path) for path in sorted(folder.glob("*.jsonl"))]
+    games = sorted({meta["court"]["scenario"] for meta, _, _ in read_ones})
+    if scenario is None and len(games) > 1:
+        raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
+    wanted = [r for r in read_ones if scenario in (None, r[0]["court"]["scenario"])]
+    if not wanted:
+        what = f" of {scenario}" if scenario else ""
+        raise ValueError(f"{folder}: there are no recordings{what} (*.jsonl) in it")
+    found = Report({}, [], len(wanted), 0)
+    for meta, steps, end in wanted:
+        _add(found, meta, steps, end)
     return found
 
 
@@ -191,6 +198,13 @@ def _add(
         _result(found, players, teams, end["success"])
     for i, player in enumerate(players):
         _watch(player, i, seats[i], meta, steps)
+
+
+def _program(name: str, fairness: dict[str, float]) -> str:
+    """A program's name, with how it was held back."""
+    usual = {"reaction": 0.0, "noise": 0.0, "pace": 1.0}
+    held = [f"{k} {v:g}" for k, v in fairness.items() if v != usual[k]]
+    return f"{name} ({', '.join(held)})" if held else name
 
 
 def _result(
@@ -288,6 +302,10 @@ def _middle(values: Sequence[float]) -> list[float]:
         return [float("nan")] * 3
     rows = np.array(values)
     return [iqm(rows), *bootstrap(rows, iqm, resamples=RESAMPLES)]
+
+
+def _number(value: float, digits: int) -> str:
+    return "-" if np.isnan(value) else f"{value:.{digits}f}"
 
 
 def _shown(values: Sequence[float], digits: int) -> str:

@@ -86,6 +86,8 @@ def replay(path: Path, door: Door) -> Starlette:
         ValueError: no recording.
     """
     meta, steps, end = read(path)
+    if not steps:
+        raise ValueError(f"{path}: there are no steps in it")
     recording = {"meta": meta, "steps": steps, "end": end}
 
     async def give(request: Request) -> Response:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hashlib
 import json
 import secrets
@@ -17,6 +18,7 @@ IDLE = 60.0
 """s without a move after which a page lets go of its seat."""
 GRACE = 10.0
 """s for which a seat is kept for a page that has gone, say to reload."""
+GONE = "a player has gone"
 BEHIND = 6
 """Ticks that the loop makes up for; what is more is let go."""
 
@@ -48,6 +50,7 @@ class Session:
         self._kept: dict[str, tuple[int, float]] = {}
         self.rate = float(RATE)
         """Ticks a second, over the last second."""
+        self._recorded: list[dict[str, Any]] = []
         self.failure: BaseException | None = None
         """Why the loop died, if it did."""
 
@@ -63,7 +66,7 @@ class Session:
         if guest.seat is not None:
             if guest.key:
                 self._kept[guest.key] = (guest.seat, time.monotonic() + GRACE)
-            self._leave(guest, "a player has gone")
+            self._leave(guest, GONE)
 
     def hear(self, guest: Guest, text: str) -> None:
         """Take a message.
@@ -80,7 +83,7 @@ class Session:
         seat, _ = self._kept.pop(key, (None, 0.0))
         if seat is not None and seat in self.free:
             self._take(guest, seat)
-            if self.court.phase == "pause":
+            if self.court.reason == GONE and not self.free:
                 self.court.start()
         elif guest.seat is None and self.free:
             self._take(guest, self.free[0])
@@ -92,7 +95,7 @@ class Session:
         hand.aim(*self.court.ego(guest.seat, x, y))
         if (x, y) != guest.place:
             guest.place, guest.moved = (x, y), time.monotonic()
-        guest.seen, guest.rtt = q, rtt or None
+        guest.seen, guest.rtt = q, rtt if rtt > 0.0 else None
 
     def _on_stick(self, guest: Guest, x: float, y: float, q: int, rtt: float) -> None:
         if guest.seat is None:
@@ -101,15 +104,19 @@ class Session:
         hand.push(*self.court.ego(guest.seat, x, y))
         if (x, y) != (0.0, 0.0):
             guest.moved = time.monotonic()
-        guest.seen, guest.rtt = q, rtt or None
+        guest.seen, guest.rtt = q, rtt if rtt > 0.0 else None
 
     def _on_start(self, guest: Guest) -> None:
-        if self._may(guest):
+        if self._may(guest) and not self.free:
             self.court.start()
 
     def _on_pause(self, guest: Guest) -> None:
         if self._may(guest):
             self.court.pause()
+
+    def _on_stop(self, guest: Guest) -> None:
+        if self._may(guest):
+            self.court.end("broken off by a player")
 
     def _on_swap(self, guest: Guest) -> None:
         """Everybody moves on by one seat: in a duel, the ends change."""
@@ -139,7 +146,9 @@ class Session:
         if not self._may(guest) or seat >= len(court.who) or seat in taken:
             return
         if name in known and court.phase in ("lobby", "done"):
-            court.seat(seat, name)
+            # What is offered fits; the rest is refused by the court.
+            with contextlib.suppress(ValueError):
+                court.seat(seat, name)
 
     def _may(self, guest: Guest) -> bool:
         """Whether a guest has a say: those with a seat, or all if programs play."""
@@ -200,8 +209,11 @@ class Session:
     def _record(self, recorder: Recorder, moved: bool) -> None:
         court = self.court
         if moved and court.ticks == 1:
-            recorder.begin(court, self.players)
-        if moved:
+            self._recorded = self.players
+            recorder.begin(court, self._recorded)
+        if moved and self.players != self._recorded:
+            recorder.end(court, "the players changed")
+        elif moved:
             delays: list[float | None] = [None] * len(court.who)
             for guest in self.guests:
                 if guest.seat is not None:

@@ -196,6 +196,10 @@ addEventListener("keydown", (event) => {
 $("go").onclick = () => say("start");
 $("pause").onclick = toggle;
 $("swap").onclick = () => say("swap");
+$("stop").onclick = () => say("stop");
+// What was clicked must not keep the keyboard: Space starts and pauses.
+addEventListener("click", (event) => { const button = event.target.closest("button"); if (button) button.blur(); });
+$("speed").onchange = () => $("speed").blur();
 $("leave").onclick = () => say("leave");
 
 let audio = null;
@@ -402,7 +406,7 @@ function words() {
   if (tape) { put($("pause"), tape.runs ? "Pause" : "Play"); seats(-1); $("notice").hidden = flash <= 0.3; if (flash > 0.3) show("Goal!", "", "", true); return; }
   const runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
   const free = now.seats.findIndex((s) => s.who === "person" && !s.taken);
-  const say = sits || now.seats.every((s) => s.who !== "person");
+  const say = (sits || now.seats.every((s) => s.who !== "person")) && free < 0;
   put($("pause"), runs ? "Pause" : "Start"); $("pause").disabled = !say;
   $("swap").hidden = now.seats.length < 2; $("swap").disabled = runs || now.phase === "pause" || !say;
   $("leave").hidden = !sits;
@@ -410,7 +414,7 @@ function words() {
   seats(free);
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.left)), "", "", true);
-  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits ? "Move the pointer to move your paddle. Space starts." : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
+  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? "Move the pointer to move your paddle. Space starts." : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
   else if (now.phase === "pause") show("Paused", now.reason, say ? "Go on" : "");
   else if (now.phase === "done") show(verdict(), now.reason, say ? "Again" : "");
   else if (flash > 0.3) show("Goal!", "", "", true);
