@@ -8,11 +8,6 @@ from marl_airhockey.driver import Driver, View
 from marl_airhockey.rewards import length
 from marl_airhockey.state import Array
 
-GAIN = 25.0
-"""1/s: asked speed for a metre of distance, near the target."""
-BRAKE = 0.6
-"""Share of the seat's acceleration that is reckoned with for stopping in time."""
-
 
 class Mouse(Driver):
     """Holds a wanted position and asks for a velocity that ends there at rest.
@@ -20,6 +15,11 @@ class Mouse(Driver):
     What it asks is bounded by the seat's top speed and by a speed from which the paddle
     can still stop in time; `limits` bounds it once more, as it does for everybody.
     """
+
+    gain = 25.0
+    """1/s: asked speed for a metre of distance, near the target."""
+    brake = 0.6
+    """Share of the seat's acceleration that is reckoned with for stopping in time."""
 
     def __init__(self) -> None:
         self.target: tuple[float, float] | None = None
@@ -41,8 +41,8 @@ class Mouse(Driver):
             return np.zeros_like(own), memory
         way = np.array(self.target) - own
         far = np.maximum(length(way), 1e-9)
-        brake = BRAKE * view.cast.seats[view.seat].acceleration
-        speed = np.minimum(GAIN * far, np.sqrt(2.0 * brake * far))
+        brake = self.brake * view.cast.seats[view.seat].acceleration
+        speed = np.minimum(self.gain * far, np.sqrt(2.0 * brake * far))
         speed = np.minimum(speed, view.top_speed)
         return way * (speed / far / view.top_speed)[:, None], memory
 

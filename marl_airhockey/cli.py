@@ -84,11 +84,11 @@ def train(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
     engine: Annotated[
-        str, typer.Option(help="sb3 in this process, rllib over many.")
-    ] = "sb3",
+        str | None, typer.Option(help="sb3 in this process (usual), rllib over many.")
+    ] = None,
     num_env_runners: Annotated[
-        int, typer.Option(help="Of rllib: processes that step the worlds.")
-    ] = 0,
+        int | None, typer.Option(help="Of rllib: processes that step the worlds.")
+    ] = None,
     change: Annotated[
         list[str] | None,
         typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
@@ -107,8 +107,6 @@ def train(
             "seed": seed,
             "backend": backend,
             "profile": profile,
-            "engine": engine,
-            "num_env_runners": num_env_runners,
             "options": settings(option),
             "drivers": settings(other),
         }
@@ -116,10 +114,15 @@ def train(
             changes["total_steps"] = steps
         if hidden is not None:
             changes["hidden"] = [hidden, hidden]
+        if engine is not None:
+            changes["engine"] = engine
+        if num_env_runners is not None:
+            changes["num_env_runners"] = num_env_runners
         config = preset(scenario, changes)
         folder = out or Path("runs") / f"{scenario}-{seed}"
     else:
-        if scenario or change or option or other or steps or hidden or out:
+        given = (scenario, change, option, other, steps, hidden, out, engine)
+        if any(given) or num_env_runners is not None:
             raise ValueError("--resume goes on as the run was begun: give nothing else")
         config, folder = None, resume
     with bar() as progress:

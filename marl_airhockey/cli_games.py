@@ -53,6 +53,9 @@ def league(
         int | None,
         typer.Option(help="Train a best response to each policy for so many steps."),
     ] = None,
+    exploit_seeds: Annotated[
+        int, typer.Option(help="Best responses to each, of seeds 0 .. N - 1.", min=1)
+    ] = 1,
     as_json: AsJson = False,
 ) -> None:
     """Let everybody play everybody: ratings, matrix, circles."""
@@ -63,8 +66,9 @@ def league(
     entrants = {label(name, names): make_driver(name) for name in names}
     standings = play_league(scenario, entrants, games, keywords=keywords)
     files = standings.save(out)
-    responses = best_responses(scenario, names, exploit, out) if exploit else {}
-    if responses:
+    responses: dict[str, list[float]] = {}
+    if exploit:
+        responses = best_responses(scenario, names, exploit, exploit_seeds, out)
         (out / "exploitability.json").write_text(json.dumps(responses, indent=1))
     if as_json:
         report = {**standings.to_json(), "best_responses": responses}
@@ -73,8 +77,9 @@ def league(
     console.print(table(standings))
     for circle in standings.circles:
         console.print("circle:", " > ".join((*circle, circle[0])))
-    for name, score in responses.items():
-        console.print(f"best response to {name} after {exploit:,} steps: {score:.3f}")
+    for name, scores in responses.items():
+        shown = ", ".join(f"{score:.3f}" for score in scores)
+        console.print(f"best response to {name} after {exploit:,} steps: {shown}")
     console.print("files:", *files)
 
 
@@ -85,20 +90,21 @@ def label(name: str, names: list[str]) -> str:
 
 
 def best_responses(
-    scenario: str, names: list[str], steps: int, out: Path
-) -> dict[str, float]:
-    """The score of what learned to beat each player, in as many steps."""
+    scenario: str, names: list[str], steps: int, seeds: int, out: Path
+) -> dict[str, list[float]]:
+    """The scores of what learned to beat each player, in as many steps, by seed."""
     need("stable_baselines3", "train")
     from marl_airhockey.learn.exploit import best_response
 
-    found = {}
+    found: dict[str, list[float]] = {name: [] for name in names}
     with bar() as progress:
-        task = progress.add_task("best responses", total=len(names), note="")
+        task = progress.add_task("best responses", total=seeds * len(names), note="")
         for number, name in enumerate(names):
             progress.update(task, note=name)
-            run = out / "responses" / f"{number}-{steps}"
-            found[name] = best_response(scenario, name, steps, run)
-            progress.advance(task)
+            for seed in range(seeds):
+                run = out / "responses" / f"{number}-{steps}-{seed}"
+                found[name].append(best_response(scenario, name, steps, run, seed))
+                progress.advance(task)
     return found
 
 

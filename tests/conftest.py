@@ -1,3 +1,4 @@
+import contextlib
 import os
 from pathlib import Path
 
@@ -39,5 +40,7 @@ def pytest_configure():
     folder = Path(ah.__file__).parent
     newest = max(path.stat().st_mtime for path in folder.rglob("*.py"))
     for compiled in folder.rglob("*.nb[ic]"):
-        if compiled.stat().st_mtime < newest:
-            compiled.unlink()
+        # Another run of the tests may drop them at the same time.
+        with contextlib.suppress(FileNotFoundError):
+            if compiled.stat().st_mtime < newest:
+                compiled.unlink()

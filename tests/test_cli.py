@@ -68,6 +68,12 @@ def test_demo_makes_what_it_says(tmp_path):
         (("train", "juggle", "--set", "gama=1"), "unknown setting 'gama'"),
         (("train", "juggle", "--set", "gamma"), "NAME=VALUE"),
         (("train", "--resume", "nowhere"), "no training configuration"),
+        (("train", "--resume", "nowhere", "--engine", "sb3"), "give nothing else"),
+        (("train", "reach", "--engine", "jax"), "unknown engine 'jax'"),
+        (("train", "reach", "--engine", "rllib", "--num-env-runners", "3"), "divide"),
+        (("record", "report", "nowhere"), "no such folder"),
+        (("watch", "nowhere.jsonl"), "cannot be read"),
+        (("league", "duel", "--games", "0"), "--games"),
         (("watch", "still", "-s", "reach", "--video", "a.avi"), "must end in"),
     ],
 )

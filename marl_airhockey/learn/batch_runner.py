@@ -132,7 +132,7 @@ class BatchRunner(SingleAgentEnvRunner):
                         rows,
                         chosen[a:b, slot],
                         reward[a:b, slot],
-                        {name: rows[a:b, slot] for name, rows in columns.items()},
+                        {name: column[a:b, slot] for name, column in columns.items()},
                         final,
                     )
                 )

@@ -87,6 +87,7 @@ class Court:
                 )
         self.who = [PERSON for _ in agents]
         self._hands: list[Driver] = [make_agent("mouse") for _ in agents]
+        self._kinds = ["mouse" for _ in agents]
         self._driven = [self._sit(i) for i in range(len(agents))]
         self.phase: Phase = "lobby"
         self.number, self.ticks, self.left = 0, 0, 0.0
@@ -160,6 +161,7 @@ class Court:
         except ValueError:
             self.who[i], self._driven[i] = before, driven
             raise
+        driven.driver.__exit__(None, None, None)
         if self.phase == "done":
             self.world.reset()
             self._begin()
@@ -169,8 +171,8 @@ class Court:
 
     def hand(self, i: int, kind: str) -> Driver:
         """What a person steers a seat with: "mouse" or "gamepad"."""
-        if self.who[i] == PERSON and not _is(self._hands[i], kind):
-            self._hands[i] = make_agent(kind)
+        if self.who[i] == PERSON and self._kinds[i] != kind:
+            self._kinds[i], self._hands[i] = kind, make_agent(kind)
             self._driven[i] = self._sit(i)
             self._start_drivers([i])
         return self._hands[i]
@@ -254,6 +256,12 @@ class Court:
         if self.result.terminated[0] or self.result.truncated[0]:
             self.phase, self.reason = "done", ""
 
+    def close(self) -> None:
+        """Leave the drivers and close the physics."""
+        for seat in self._driven:
+            seat.driver.__exit__(None, None, None)
+        self.world.close()
+
     @property
     def winners(self) -> list[int]:
         """Seats that have done what the scenario calls success."""
@@ -290,6 +298,7 @@ class Court:
         table, cast = self.cast.table, self.cast
         sides = [seat.side for seat in cast.seats]
         radius = cast.bodies.radius
+        mouse: Any = make_agent("mouse")
         return {
             "scenario": self.world.scenario.name,
             "seconds": self.world.max_cycles / RATE,
@@ -322,12 +331,9 @@ class Court:
                 }
                 for i, seat in enumerate(cast.seats)
             ],
+            "mouse": {"gain": mouse.gain, "brake": mouse.brake},
             "choices": self.choices,
         }
-
-
-def _is(driver: Driver, kind: str) -> bool:
-    return type(driver).__module__.endswith(f".{kind}")
 
 
 def _rounded(values: Array) -> Any:

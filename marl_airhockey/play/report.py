@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.limits import EXCESS
+from marl_airhockey.play.court import Fairness
 from marl_airhockey.play.recorder import read
 from marl_airhockey.state import Array
 from marl_airhockey.stats import bootstrap, elo, interval, iqm
@@ -202,7 +203,7 @@ def _add(
 
 def _program(name: str, fairness: dict[str, float]) -> str:
     """A program's name, with how it was held back."""
-    usual = {"reaction": 0.0, "noise": 0.0, "pace": 1.0}
+    usual = vars(Fairness())
     held = [f"{k} {v:g}" for k, v in fairness.items() if v != usual[k]]
     return f"{name} ({', '.join(held)})" if held else name
 

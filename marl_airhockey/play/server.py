@@ -110,6 +110,7 @@ def application(session: Session, door: Door) -> Starlette:
         loop.cancel()
         if session.recorder is not None:
             session.recorder.end(session.court, "the server was stopped")
+        session.court.close()
 
     async def talk(socket: WebSocket) -> None:
         reason = door.refuses(socket)

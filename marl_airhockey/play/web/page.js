@@ -6,7 +6,6 @@ const $ = (id) => document.getElementById(id);
 const canvas = $("table"), pen = canvas.getContext("2d");
 const SEAT = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const LATE = 20; // ms by which others are drawn late, so that there is a frame after it
-const GAIN = 25, BRAKE = 0.6; // as in agents/mouse.py
 const TRAIL = 26;
 
 let court = null, now = null, before = null, nowAt = 0, beforeAt = 0;
@@ -132,7 +131,7 @@ function predict(dt) {
   const seat = seatNow();
   if (!mine || !seat || !pointer || now.phase !== "play") return;
   const wx = pointer[0] - mine.x, wy = pointer[1] - mine.y, far = Math.max(Math.hypot(wx, wy), 1e-9);
-  const speed = Math.min(GAIN * far, Math.sqrt(2 * BRAKE * seat.acceleration * far), seat.speed);
+  const speed = Math.min(court.mouse.gain * far, Math.sqrt(2 * court.mouse.brake * seat.acceleration * far), seat.speed);
   let ax = (wx / far) * speed - mine.vx, ay = (wy / far) * speed - mine.vy;
   const most = seat.acceleration * dt, size = Math.hypot(ax, ay);
   if (size > most) { ax *= most / size; ay *= most / size; }
