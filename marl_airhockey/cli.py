@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey import cli_games, cli_play
+from marl_airhockey import cli_games, cli_play, cli_study
 from marl_airhockey.catalogue import describe, summary
 from marl_airhockey.cli_common import (
     AsJson,
@@ -39,6 +39,7 @@ app.command()(cli_play.play)
 record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
 record.command()(cli_play.report)
 app.add_typer(record, name="record")
+app.add_typer(cli_study.study, name="study")
 
 
 @app.command("list")
@@ -248,12 +249,21 @@ def watch(
     ] = None,
     option: Options = None,
     other: Drivers = None,
+    host: cli_play.Host = "127.0.0.1",
+    port: cli_play.Port = 0,
+    browser: cli_play.Browser = True,
 ) -> None:
-    """Watch a driver play, in a window or as a video; or a recording of play."""
+    """Watch a driver play, in a window or as a video; or a recording of play.
+
+    --host, --port and --browser are those of a recording's page.
+    """
     from marl_airhockey.film import film
 
     if driver.endswith(".jsonl"):
-        watch_recording(Path(driver), video)
+        if video is None:
+            cli_play.show(Path(driver), host, port, browser)
+        else:
+            watch_recording(Path(driver), video)
         return
     if not scenario:
         raise ValueError("--scenario: say what the driver is to play")
@@ -263,11 +273,8 @@ def watch(
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 
 
-def watch_recording(recording: Path, video: Path | None) -> None:
-    """Show a recording in the browser, or make a video of it."""
-    if video is None:
-        cli_play.show(recording, "127.0.0.1", 0, True)
-        return
+def watch_recording(recording: Path, video: Path) -> None:
+    """Make a video of a recording."""
     from marl_airhockey.play.film import film
 
     film(recording, video)

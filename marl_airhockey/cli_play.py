@@ -94,7 +94,7 @@ def play(
     with console.status("preparing the table (longer when it is the first time)"):
         court.rehearse()
     session = Session(court, Recorder(record) if record else None)
-    _host(lambda door: application(session, door), scenario, host, port, browser)
+    host_table(lambda door: application(session, door), scenario, host, port, browser)
     if session.failure is not None:
         raise session.failure
 
@@ -105,7 +105,8 @@ def show(recording: Path, host: str, port: int, browser: bool) -> None:
     need("uvicorn", "play")
     from marl_airhockey.play.server import replay
 
-    _host(lambda door: replay(recording, door), recording.name, host, port, browser)
+    name = recording.name
+    host_table(lambda door: replay(recording, door), name, host, port, browser)
 
 
 def report(
@@ -118,20 +119,25 @@ def report(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Sum recordings up: results, reactions, shots, time at limits, with intervals."""
+    """Sum recordings up: results, reactions, shots, limits; and a study's answers."""
     need("matplotlib", "train")
     from marl_airhockey.play.report import report as sum_up
+    from marl_airhockey.study.answers import read_answers
 
-    found = sum_up(folder, scenario)
+    found, asked = sum_up(folder, scenario), read_answers(folder)
     files = found.save(out or folder)
+    if asked.participants:
+        files += asked.save(out or folder)
     if as_json:
         console.print_json(files[0].read_text())
         return
-    console.print(files[1].read_text(), markup=False, soft_wrap=True)
+    for path in files:
+        if path.suffix == ".md":
+            console.print(path.read_text(), markup=False, soft_wrap=True)
     console.print("files:", *files, soft_wrap=True)
 
 
-def _host(
+def host_table(
     make: Callable[[Door], Starlette], what: str, host: str, port: int, browser: bool
 ) -> None:
     """Serve an application, say where, and open it."""

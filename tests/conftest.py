@@ -1,5 +1,6 @@
 import contextlib
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 import marl_airhockey as ah
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
 
 
@@ -33,6 +35,20 @@ def _one_thread():
     import torch
 
     torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium here: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(
+            executable_path=CHROMIUM,
+            args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
+        )
+        yield found
+        found.close()
 
 
 def pytest_configure():

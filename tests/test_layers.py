@@ -52,6 +52,8 @@ LAYERS = (
         "cli_games",
         "cli_play",
         "play",
+        "cli_study",
+        "study",
     },
 )
 PURE = sorted(LAYERS[0] | LAYERS[1])

@@ -3,10 +3,7 @@
 import asyncio
 import contextlib
 import json
-import os
 import re
-import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -16,6 +13,7 @@ import urllib.request
 import numpy as np
 import pytest
 import websockets
+from pages import aim, line, page_at, running, state_of, wait
 from PIL import Image
 
 from marl_airhockey.play.court import RATE, Court, Fairness
@@ -52,15 +50,6 @@ BAD = [
     "[" * 900,
     '{"t":"start","x":"' + "y" * LARGEST + '"}',
 ]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-
-
-def line(kind, **fields):
-    return json.dumps({"t": kind, **fields})
-
-
-def aim(x, y, q=1):
-    return line("aim", x=x, y=y, q=q, rtt=0)
 
 
 @pytest.mark.parametrize("text", BAD)
@@ -312,7 +301,12 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
         session.tick()
     (path,) = tmp_path.iterdir()
     meta, steps, end = read(path)
-    assert meta["players"][0] == {"seat": 0, "driver": "person", "person": guest.name}
+    assert meta["players"][0] == {
+        "seat": 0,
+        "driver": "person",
+        "person": guest.name,
+        "consent": None,
+    }
     assert meta["physics"]["tilt"] == 0.0
     assert len(steps) == 2 * RATE == end["steps"]
     assert steps[-1]["n"] == 2 * RATE
@@ -398,23 +392,6 @@ def served(*options):
     options = ("play", *options, "--port", "0", "--no-browser")
     with running(*options) as (address, process):
         yield address, process
-
-
-@contextlib.contextmanager
-def running(*words):
-    command = [sys.executable, "-m", "marl_airhockey.cli", *words]
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "BROWSER": "true"},
-    )
-    try:
-        yield re.search(r"http://\S+", process.stdout.readline())[0], process
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.wait(10)
-        process.stdout.close()
 
 
 def socket_of(address):
@@ -534,43 +511,6 @@ def test_a_taken_port_is_named():
         assert "Traceback" not in done.stderr
 
 
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api")
-    if CHROMIUM is None:
-        pytest.skip("no Chromium here: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(
-            executable_path=CHROMIUM,
-            args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
-        )
-        yield found
-        found.close()
-
-
-def page_at(browser, address, complaints, **options):
-    page = browser.new_page(
-        viewport={"width": 1000, "height": 600}, bypass_csp=True, **options
-    )
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on(
-        "console", lambda m: complaints.append(m.text) if m.type == "error" else None
-    )
-    page.goto(address)
-    page.wait_for_function("window.airhockey.frames.length > 5")
-    return page
-
-
-def state_of(page):
-    return page.evaluate("window.airhockey.state()")
-
-
-def wait(page, condition):
-    page.wait_for_function(
-        f"(() => {{ const s = airhockey.state(); return {condition}; }})()"
-    )
-
-
 def test_a_person_plays_in_the_browser(browser):
     complaints = []
     with served("duel", "--opponent", "still", "--option", "goals_to_win=1") as (at, _):
@@ -641,7 +581,7 @@ def test_a_recording_is_watched_in_the_page(browser, tmp_path):
         wait(page, "s.n > 30")
         page.locator("#pause").click()
         page.locator("#scrub").fill("200")
-        wait(page, "s.n === 201")
+        wait(page, "s.n === 200")
         page.locator("#speed").select_option("4")
         page.locator("#pause").click()
         wait(page, "s.n > 260")

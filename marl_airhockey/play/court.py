@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from marl_airhockey.catalogue import what
 from marl_airhockey.driver import Driver
 from marl_airhockey.episode import Step
 from marl_airhockey.frozen import Frozen
@@ -51,6 +52,21 @@ class Fairness:
         """The driver, held back."""
         return Handicap(driver, self.reaction, self.noise, self.pace)
 
+    @property
+    def words(self) -> str:
+        """What is held back, in words; nothing for none of it."""
+        usual = vars(Fairness())
+        held = {k: v for k, v in vars(self).items() if v != usual[k]}
+        return ", ".join(f"{k} {v:g}" for k, v in held.items())
+
+
+STRENGTHS = {
+    "full strength": Fairness(),
+    "human speed": Fairness(reaction=0.15, noise=0.05, pace=0.7),
+    "gentle": Fairness(reaction=0.25, noise=0.1, pace=0.4),
+}
+"""How programs are held back at a page's choice, the full-strength one first."""
+
 
 class Court:
     """A world of which every seat is driven, in the phases of a match.
@@ -90,6 +106,8 @@ class Court:
         self._kinds = ["mouse" for _ in agents]
         self._driven = [self._sit(i) for i in range(len(agents))]
         self.phase: Phase = "lobby"
+        self.opening: dict[str, Any] = {}
+        """What `state` was before the first step of this episode."""
         self.number, self.ticks, self.left = 0, 0, 0.0
         self.reason = ""
         self.events: list[list[Any]] = []
@@ -169,6 +187,19 @@ class Court:
         else:
             self._start_drivers([i])
 
+    def hold_back(self, fairness: Fairness) -> None:
+        """Hold all programs back, from the next match on.
+
+        Raises:
+            ValueError: during a match.
+        """
+        if self.phase not in ("lobby", "done"):
+            raise ValueError("opponents change between matches")
+        self.fairness = fairness
+        for i, name in enumerate(self.who):
+            if name != PERSON:
+                self.seat(i, name)
+
     def hand(self, i: int, kind: str) -> Driver:
         """What a person steers a seat with: "mouse" or "gamepad"."""
         if self.who[i] == PERSON and self._kinds[i] != kind:
@@ -187,6 +218,7 @@ class Court:
         self.ticks, self.result, self.events = 0, None, []
         self.number += 1
         self._start_drivers(range(len(self.seats)))
+        self.opening = self.state()
 
     def _start_drivers(self, seats: Iterable[int]) -> None:
         one, world = np.zeros(1, np.int64), self.world
@@ -332,7 +364,7 @@ class Court:
                 for i, seat in enumerate(cast.seats)
             ],
             "mouse": {"gain": mouse.gain, "brake": mouse.brake},
-            "choices": self.choices,
+            "what": what(self.world.scenario),
         }
 
 

@@ -23,10 +23,16 @@ MESSAGES: dict[str, dict[str, type]] = {
     "sit": {"seat": int},
     "leave": {},
     "opponent": {"seat": int, "name": str},
+    "strength": {"name": str},
+    "consent": {"version": str},
+    "answer": {"question": str, "value": int},
+    "withdraw": {},
+    "next": {},
 }
 """Kinds of messages and their fields. Places are metres in the table frame, sticks
 shares of full tilt in the table frame, ``q`` counts a page's aims, ``rtt`` is the time
-in ms that it measured between an aim and the frame that shows it."""
+in ms that it measured between an aim and the frame that shows it. The last four are of
+studies alone."""
 
 
 def parse(text: str) -> tuple[str, dict[str, Any]]:

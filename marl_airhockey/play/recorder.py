@@ -1,7 +1,8 @@
 """Games on disk, line by line: what is written survives a kill of the process.
 
-An episode is a file of JSON lines: ``meta``, a ``step`` for every control step, and an
-``end``. A file without an end was cut off.
+An episode is a file of JSON lines: ``meta`` (with the state before the first step as
+``start``), a ``step`` for every control step, and an ``end``. A file without an end was
+cut off.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ class Recorder:
         except OSError as error:
             raise ValueError(f"--record {folder}: {error.strerror}") from error
         self._folder = folder
+        self.notes: dict[str, Any] = {}
+        """What else the first line of a file says, under "study"."""
         self._file: TextIO | None = None
         self._synced = 0.0
 
@@ -65,7 +68,9 @@ class Recorder:
                     "marl_airhockey": metadata.version("marl_airhockey"),
                     "python": platform.python_version(),
                 },
+                "study": self.notes,
                 "court": court.describe(),
+                "start": court.opening,
             }
         )
         return path
@@ -116,6 +121,16 @@ class Recorder:
         self._file.write(json.dumps(row, separators=(",", ":")) + "\n")
         # To the system: a killed process loses nothing of it.
         self._file.flush()
+
+
+def head(path: Path) -> dict[str, Any]:
+    """The first line of a file of JSON lines; {} if it is none."""
+    try:
+        with path.open() as file:
+            row = json.loads(file.readline())
+    except (OSError, ValueError):
+        return {}
+    return row if isinstance(row, dict) else {}
 
 
 def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:

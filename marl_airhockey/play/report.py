@@ -12,7 +12,7 @@ import numpy as np
 
 from marl_airhockey.limits import EXCESS
 from marl_airhockey.play.court import Fairness
-from marl_airhockey.play.recorder import read
+from marl_airhockey.play.recorder import head, read
 from marl_airhockey.state import Array
 from marl_airhockey.stats import bootstrap, elo, interval, iqm
 
@@ -25,6 +25,10 @@ LONGEST = 1.5
 COMPLETE = "played to the end"
 """How a recording ends whose game was not broken off."""
 RESAMPLES = 400
+ASIDE = ("diary.jsonl", "erased.jsonl")
+"""What a study keeps beside its recordings."""
+FEWEST = 5
+"""Games without which an Elo has no interval: their results are too often all alike."""
 
 
 @dataclass
@@ -109,6 +113,8 @@ class Report:
         middle = rate(np.arange(count))
         drawn = [rate(rng.integers(0, count, count)) for _ in range(RESAMPLES)]
         low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
+        enough = [sum(name in game[:2] for game in self.games) for name in names]
+        low[np.array(enough) < FEWEST] = high[np.array(enough) < FEWEST] = np.nan
         return {
             name: [float(middle[i]), float(low[i]), float(high[i])]
             for i, name in enumerate(names)
@@ -137,7 +143,8 @@ class Report:
             "Score: win + draw / 2, of games played to the end. Reaction: from a serve "
             f"to the first movement above {MOVES} m/s. Shots: pucks that left the "
             "paddle toward the other end; their interquartile mean speed, and the "
-            "deviation of where they would reach that end. At limits: share of the "
+            "deviation of where they would reach that end. An Elo of fewer than "
+            f"{FEWEST} games has no interval. At limits: share of the "
             "steps in which what was asked exceeded speed, acceleration or reach.",
         ]
         return "\n".join(lines) + "\n"
@@ -157,14 +164,20 @@ class Report:
 
 
 def report(folder: Path, scenario: str | None = None) -> Report:
-    """Read all recordings of a folder, or those of one scenario.
+    """Read all recordings under a folder, or those of one scenario.
+
+    Practice games of a study are left out.
 
     Raises:
         ValueError: there is none, a file that is no recording, or several scenarios.
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: there is no such folder")
-    read_ones = [read(path) for path in sorted(folder.glob("*.jsonl"))]
+    read_ones = [
+        read(path)
+        for path in sorted(folder.rglob("*.jsonl"))
+        if path.name not in ASIDE and not head(path).get("study", {}).get("practice")
+    ]
     games = sorted({meta["court"]["scenario"] for meta, _, _ in read_ones})
     if scenario is None and len(games) > 1:
         raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
@@ -187,9 +200,7 @@ def _add(
     """Take an episode into a report."""
     seats, players = meta["court"]["seats"], []
     for row in meta["players"]:
-        name = row["person"] or (
-            "nobody" if row["driver"] == "person" else row["driver"]
-        )
+        name = row["person"] or _program(row["driver"], meta["fairness"])
         known = found.players.setdefault(name, Player(name, row["person"] is not None))
         players.append(known)
     complete = end.get("reason") == COMPLETE
@@ -203,9 +214,8 @@ def _add(
 
 def _program(name: str, fairness: dict[str, float]) -> str:
     """A program's name, with how it was held back."""
-    usual = vars(Fairness())
-    held = [f"{k} {v:g}" for k, v in fairness.items() if v != usual[k]]
-    return f"{name} ({', '.join(held)})" if held else name
+    held = Fairness(**fairness).words
+    return f"{name} ({held})" if held else name
 
 
 def _result(
@@ -313,4 +323,6 @@ def _shown(values: Sequence[float], digits: int) -> str:
     middle, low, high = values
     if np.isnan(middle):
         return "-"
+    if np.isnan(low):
+        return f"{middle:.{digits}f}"
     return f"{middle:.{digits}f} ({low:.{digits}f}..{high:.{digits}f})"

@@ -147,7 +147,7 @@ def _note_failure(session: Session, task: asyncio.Task[None]) -> None:
 async def _write(socket: WebSocket, session: Session, guest: Guest) -> None:
     """Send a guest the newest frame whenever the last one is through."""
     try:
-        await socket.send_json({"t": "court", **session.court.describe()})
+        await socket.send_json({"t": "court", **session.describe()})
         while True:
             await guest.news.wait()
             guest.news.clear()

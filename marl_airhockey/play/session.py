@@ -10,7 +10,7 @@ import secrets
 import time
 from typing import Any
 
-from marl_airhockey.play.court import PERSON, RATE, Court
+from marl_airhockey.play.court import PERSON, RATE, STRENGTHS, Court
 from marl_airhockey.play.protocol import Meter, parse
 from marl_airhockey.play.recorder import Recorder
 
@@ -30,6 +30,8 @@ class Guest:
         self.name = secrets.token_hex(4)
         """Pseudonym: the same for all games of a page, known to nobody."""
         self.key = ""
+        self.consent: str | None = None
+        """Version of what they have agreed to, in a study."""
         self.seat: int | None = None
         self.seen = 0
         """Number of the last aim that the world has taken."""
@@ -43,6 +45,13 @@ class Guest:
 
 class Session:
     """A court that runs in real time, and the guests around it."""
+
+    HEARS = {"hello", "aim", "stick", "start", "pause", "stop", "swap", "sit"} | {
+        "leave",
+        "opponent",
+        "strength",
+    }
+    """Kinds of messages that are taken."""
 
     def __init__(self, court: Court, recorder: Recorder | None = None) -> None:
         self.court, self.recorder = court, recorder
@@ -76,6 +85,8 @@ class Session:
         """
         guest.meter.take(time.monotonic())
         kind, fields = parse(text)
+        if kind not in self.HEARS:
+            raise ValueError(f"{kind}: not at this table")
         getattr(self, f"_on_{kind}")(guest, **fields)
 
     def _on_hello(self, guest: Guest, key: str) -> None:
@@ -149,6 +160,11 @@ class Session:
             # What is offered fits; the rest is refused by the court.
             with contextlib.suppress(ValueError):
                 court.seat(seat, name)
+
+    def _on_strength(self, guest: Guest, name: str) -> None:
+        court = self.court
+        if self._may(guest) and name in STRENGTHS and court.phase in ("lobby", "done"):
+            court.hold_back(STRENGTHS[name])
 
     def _may(self, guest: Guest) -> bool:
         """Whether a guest has a say: those with a seat, or all if programs play."""
@@ -225,27 +241,49 @@ class Session:
     @property
     def players(self) -> list[dict[str, Any]]:
         """Who sits at each seat."""
-        people = {g.seat: g.name for g in self.guests}
-        return [
-            {"seat": i, "driver": name, "person": people.get(i)}
-            for i, name in enumerate(self.court.who)
-        ]
+        people = {g.seat: (g.name, g.consent) for g in self.guests}
+        rows = []
+        for i, driver in enumerate(self.court.who):
+            person, consent = people.get(i, (None, None))
+            rows.append(
+                {"seat": i, "driver": driver, "person": person, "consent": consent}
+            )
+        return rows
+
+    def describe(self) -> dict[str, Any]:
+        """What a page must know once, JSON."""
+        return {
+            **self.court.describe(),
+            "choices": self.court.choices,
+            "strengths": list(STRENGTHS),
+        }
 
     def _show(self) -> None:
         """Put a new frame before every guest; one that was not fetched is dropped."""
-        shared = {
-            "t": "state",
-            **self.court.state(),
+        shared = {"t": "state", **self.court.state(), **self._around()}
+        text = json.dumps(shared, separators=(",", ":"))[:-1]
+        for guest in self.guests:
+            own = json.dumps(self._own(guest), separators=(",", ":"))
+            guest.frame = f"{text},{own[1:]}"
+            guest.news.set()
+
+    def _around(self) -> dict[str, Any]:
+        """What is said of the people and programs around the court."""
+        fairness = self.court.fairness
+        return {
             "seats": [
                 {"who": p["driver"], "taken": p["person"] is not None}
                 for p in self.players
             ],
+            "strength": next(
+                (name for name, held in STRENGTHS.items() if held == fairness),
+                fairness.words,
+            ),
             "watching": sum(guest.seat is None for guest in self.guests),
             "rate": round(self.rate, 1),
             "recording": self.recorder is not None,
         }
-        text = json.dumps(shared, separators=(",", ":"))[:-1]
-        for guest in self.guests:
-            seat = "null" if guest.seat is None else guest.seat
-            guest.frame = f'{text},"seat":{seat},"ack":{guest.seen}}}'
-            guest.news.set()
+
+    def _own(self, guest: Guest) -> dict[str, Any]:
+        """What is said to one guest alone."""
+        return {"seat": guest.seat, "ack": guest.seen}

@@ -13,6 +13,7 @@ let socket = null, down = false, refused = "";
 let pointer = null, pointedAt = null, aimed = 0, sentAt = 0, trip = null, flash = 0, flashColour = "";
 let mine = null; // predicted own paddle: x, y, vx, vy
 let predicted = []; // [aim, x, y] of the last aims
+let steered = false; // by a stick or keys: nothing is predicted then
 let trails = [], fit = null, drawnAt = performance.now();
 const pending = new Map(); // aim -> time of the pointer event
 const probe = (window.airhockey = { frames: [], latencies: [], state: () => now });
@@ -48,10 +49,10 @@ async function begin() {
   court = meta.court;
   const seats = meta.players.map((p) => ({ who: p.driver, taken: p.person !== null }));
   tape = { at: 0, runs: true, end, shown: -1, rate: 1 / meta.control_dt };
-  tape.steps = steps.map((step) => ({ ...step, seats, seat: null, ack: 0, watching: 0, rate: 1 / meta.control_dt, recording: false }));
-  $("scrub").max = steps.length - 1;
+  tape.steps = [meta.start, ...steps].map((step) => ({ ...step, seats, seat: null, ack: 0, watching: 0, rate: 1 / meta.control_dt, recording: false }));
+  $("scrub").max = steps.length;
   $("timeline").hidden = false;
-  for (const name of ["swap", "leave"]) $(name).hidden = true;
+  for (const name of ["swap", "leave", "strength", "stop"]) $(name).hidden = true;
   $("scrub").oninput = () => { tape.at = Number($("scrub").value); trails = []; };
   $("scrub").onchange = () => $("scrub").blur();
   resize();
@@ -105,7 +106,7 @@ function seatNow() { return now && now.seat !== null ? court.seats[now.seat] : n
 function correct(data) {
   if (data.seat === null) { mine = null; return; }
   const [x, y] = data.pads[data.seat];
-  if (!mine || data.phase !== "play") { mine = { x, y, vx: 0, vy: 0 }; predicted = []; return; }
+  if (!mine || data.phase !== "play" || steered) { mine = { x, y, vx: 0, vy: 0 }; predicted = []; return; }
   const past = predicted.find((p) => p[0] === data.ack);
   if (!past) return;
   // What the server has now is what we had when we sent the aim that it has taken.
@@ -147,14 +148,15 @@ function aim(event) {
   const box = canvas.getBoundingClientRect();
   pointer = fromScreen(event.clientX - box.left, event.clientY - box.top);
   pointedAt = event.timeStamp;
+  steered = false;
   // At once, not with the next frame: that would cost a hundredth of a second.
   if (performance.now() - sentAt > 6) tell(performance.now());
 }
 
 function tell(at) {
   if (!now || now.seat === null) return;
-  const pad = gamepad();
-  if (pad) { sentAt = at; say("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: trip || 0 }); pending.set(aimed, at); return; }
+  const pad = stick();
+  if (pad) { steered = true; pointer = null; sentAt = at; say("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: trip || 0 }); pending.set(aimed, at); return; }
   const fresh = pointedAt !== null;
   if (!pointer || (!fresh && at - sentAt < 250)) return;
   pending.set(++aimed, fresh ? pointedAt : at);
@@ -167,17 +169,21 @@ function tell(at) {
   say("aim", { x: limit(pointer[0]), y: limit(pointer[1]), q: aimed, rtt: trip || 0 });
 }
 
-let padUsed = 0;
-function gamepad() {
+let stickUsed = 0;
+const held = new Set(); // arrow keys
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+function stick() {
   const pad = (navigator.getGamepads ? [...navigator.getGamepads()] : []).find(Boolean);
-  if (!pad) return null;
-  let x = pad.axes[0] || 0, y = -(pad.axes[1] || 0);
-  if (Math.hypot(x, y) > 0.12) padUsed = performance.now();
-  if (performance.now() - padUsed > 2000) return null;
+  let x = pad ? pad.axes[0] || 0 : 0, y = pad ? -(pad.axes[1] || 0) : 0;
+  for (const code of held) { x += ARROWS[code][0]; y += ARROWS[code][1]; }
+  if (Math.hypot(x, y) > 0.12) stickUsed = performance.now();
+  if (!stickUsed || performance.now() - stickUsed > 2000) return null;
   // Right on the stick is right on the screen, whatever seat it is.
   const a = toWorldWay(x, y);
   return [Math.max(-1, Math.min(1, a[0])), Math.max(-1, Math.min(1, a[1]))];
 }
+addEventListener("keyup", (event) => held.delete(event.code));
+addEventListener("blur", () => held.clear());
 
 // Raw updates come at once; others wait for the next picture.
 canvas.addEventListener("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", aim);
@@ -187,9 +193,10 @@ function toggle() {
   say(now && (now.phase === "play" || now.phase === "countdown") ? "pause" : "start");
 }
 addEventListener("keydown", (event) => {
-  if (event.target.tagName === "SELECT" || event.repeat) return;
+  if (["SELECT", "INPUT"].includes(event.target.tagName) || event.repeat) return;
+  if (event.code in ARROWS) { event.preventDefault(); held.add(event.code); }
   if (event.code === "Space" || event.code === "Enter") { if (event.target.tagName === "BUTTON") return; event.preventDefault(); toggle(); }
-  if (event.code === "KeyS") say("swap");
+  if (event.code === "KeyS" && court && !court.study) say("swap");
   if (event.code === "KeyM") $("sound").click();
 });
 $("go").onclick = () => say("start");
@@ -200,6 +207,8 @@ $("stop").onclick = () => say("stop");
 addEventListener("click", (event) => { const button = event.target.closest("button"); if (button) button.blur(); });
 $("speed").onchange = () => $("speed").blur();
 $("leave").onclick = () => say("leave");
+$("withdraw").onclick = () => { leaving = true; };
+$("strength").onchange = () => { say("strength", { name: $("strength").value }); $("strength").blur(); };
 
 let audio = null;
 $("sound").onclick = () => {
@@ -402,7 +411,8 @@ function words() {
   put($("rate"), `loop ${now.rate.toFixed(1)} Hz`);
   put($("watching"), now.watching ? `${now.watching} watching` : "");
   $("recording").hidden = !now.recording;
-  if (tape) { put($("pause"), tape.runs ? "Pause" : "Play"); seats(-1); $("notice").hidden = flash <= 0.3; if (flash > 0.3) show("Goal!", "", "", true); return; }
+  if (tape) { replayWords(); return; }
+  if (court.study) { studyWords(); return; }
   const runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
   const free = now.seats.findIndex((s) => s.who === "person" && !s.taken);
   const say = (sits || now.seats.every((s) => s.who !== "person")) && free < 0;
@@ -411,9 +421,24 @@ function words() {
   $("leave").hidden = !sits;
   canvas.classList.toggle("mine", sits && now.phase === "play");
   seats(free);
+  strength(say && !runs && now.phase !== "pause");
+  notice(sits, free, say);
+}
+
+function replayWords() {
+  const over = now.phase === "done", ended = tape.end.reason;
+  put($("pause"), tape.runs ? "Pause" : "Play");
+  seats(-1);
+  if (over) show(verdict(), ended === "played to the end" ? "" : ended, "");
+  else if (flash > 0.3) show("Goal!", "", "", true);
+  else $("notice").hidden = true;
+}
+
+function notice(sits, free, say) {
+  $("stop").hidden = court.study || now.phase !== "pause" || !say;
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.left)), "", "", true);
-  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? "Move the pointer to move your paddle. Space starts." : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
+  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${court.what} Move the pointer to move your paddle. Space starts.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
   else if (now.phase === "pause") show("Paused", now.reason, say ? "Go on" : "");
   else if (now.phase === "done") show(verdict(), now.reason, say ? "Again" : "");
   else if (flash > 0.3) show("Goal!", "", "", true);
@@ -421,7 +446,7 @@ function words() {
 }
 
 function verdict() {
-  if (now.reason) return "Broken off";
+  if (now.reason || (tape && tape.end.reason !== "played to the end")) return "Broken off";
   const teams = new Set(court.seats.map((s) => s.team)), won = new Set(now.success.map((i) => court.seats[i].team));
   if (teams.size === 1) return won.size ? "Done!" : "Not this time";
   if (won.size !== 1) return "A draw";
@@ -446,7 +471,8 @@ function scoreboard() {
 }
 
 function titleOf(i) {
-  const who = now.seats[i].who;
+  const { who, title } = now.seats[i];
+  if (title && i !== now.seat) return title;
   return who === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : who.replace("zoo/", "policy ").replace(":strength=", ", ");
 }
 
@@ -471,11 +497,19 @@ function seats(free) {
       }
       list.onchange = () => { say("opponent", { seat: i, name: list.value }); list.blur(); panel = ""; };
       box.append(list);
-    } else if (seat.who === "person") {
+    } else if (seat.who === "person" && !court.study) {
       const sit = document.createElement("button"); sit.textContent = "Take this seat"; sit.onclick = () => say("sit", { seat: i }); box.append(sit);
     } else box.append(titleOf(i));
     $("seats").append(box);
   });
+}
+
+function strength(can) {
+  const list = $("strength"), names = [...new Set([...court.strengths, now.strength])];
+  list.hidden = now.seats.every((s) => s.who === "person");
+  list.disabled = !can;
+  if (list.options.length !== names.length) { list.textContent = ""; for (const name of names) list.append(new Option(name)); }
+  if (document.activeElement !== list) list.value = now.strength;
 }
 
 resize();

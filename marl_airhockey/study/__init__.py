@@ -1,0 +1,1 @@
+"""Studies: people play against opponents in an order that a plan says."""

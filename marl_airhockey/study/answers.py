@@ -1,0 +1,162 @@
+"""What the diaries of a study say: who was met, what was answered."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from marl_airhockey.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.play.report import RESAMPLES
+from marl_airhockey.stats import bootstrap, interval
+from marl_airhockey.study.archive import diaries
+from marl_airhockey.study.plan import QUESTIONS
+
+GAMES = ("participant", "number", "block", "game", "practice", "opponent", "result")
+ANSWERS = ("participant", "number", "block", "opponent", "question", "value")
+ORIGIN = QUESTIONS["origin"]
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Rows as they are written to disk, and how many participants came to the end."""
+
+    games: list[dict[str, Any]]
+    """Of `GAMES`; result "broken off", or "won", "lost", "drawn" by the participant"""
+    answers: list[dict[str, Any]]
+    """Of `ANSWERS`"""
+    participants: int
+    complete: int
+
+    def table(self) -> list[dict[str, Any]]:
+        """By opponent and question: the mean answer with its interval, (95 %).
+
+        For "origin" it is the share that said "a person".
+        """
+        rows = []
+        keys = sorted({(row["question"], row["opponent"]) for row in self.answers})
+        for question, opponent in keys:
+            values = np.array(
+                [
+                    row["value"]
+                    for row in self.answers
+                    if (row["question"], row["opponent"]) == (question, opponent)
+                ]
+            )
+            if question == ORIGIN.id:
+                share = float((values == 1).mean())
+                middle = [share, *interval(share, len(values))]
+            else:
+                middle = [float(values.mean()), *_bounds(values)]
+            rows.append(
+                {
+                    "question": question,
+                    "opponent": opponent,
+                    "n": len(values),
+                    "mean": middle,
+                }
+            )
+        return rows
+
+    def to_markdown(self) -> str:
+        """A table."""
+        lines = [
+            f"# {self.participants} participants, {self.complete} to the end",
+            "",
+            "| question | opponent | answers | mean (95 %) |",
+            "| --- | --- | --- | --- |",
+        ]
+        for row in self.table():
+            middle, low, high = row["mean"]
+            lines.append(
+                f"| {row['question']} | {row['opponent']} | {row['n']} "
+                f"| {middle:.2f} ({low:.2f}..{high:.2f}) |"
+            )
+        lines += [
+            "",
+            f"{ORIGIN.id}: share that said {ORIGIN.choices[0]!r}; the others 1 to 7.",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write ``games.csv``, ``answers.csv``, ``answers.md`` and ``answers.png``."""
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [
+            folder / name
+            for name in ("games.csv", "answers.csv", "answers.md", "answers.png")
+        ]
+        _write(files[0], GAMES, self.games)
+        _write(files[1], ANSWERS, self.answers)
+        files[2].write_text(self.to_markdown())
+        self._draw(files[3])
+        return files
+
+    def _draw(self, path: Path) -> None:
+        rows = self.table()
+        questions = sorted({row["question"] for row in rows})
+        opponents = sorted({row["opponent"] for row in rows})
+        figure, grid = plt.subplots(
+            1,
+            max(len(questions), 1),
+            figsize=(2.6 * max(len(questions), 1) + 1.4, 0.6 * len(opponents) + 1.4),
+            dpi=DPI,
+            layout="constrained",
+            sharey=True,
+            squeeze=False,
+        )
+        for axes, question in zip(grid[0], questions, strict=False):
+            for row in rows:
+                if row["question"] != question:
+                    continue
+                at = opponents.index(row["opponent"])
+                middle, low, high = row["mean"]
+                axes.plot([low, high], [at, at], color=INKS[0], linewidth=2)
+                axes.plot(middle, at, "o", color=INK)
+            shares = question == ORIGIN.id
+            axes.set(
+                xlim=(-0.03, 1.03) if shares else (0.8, 7.2),
+                xlabel='said "a person"' if shares else question,
+            )
+            axes.set_yticks(range(len(opponents)), opponents)
+            tidy(axes, legend=None)
+        save(figure, path)
+
+
+def _bounds(values: Any) -> tuple[float, float]:
+    if len(values) < 2:
+        return float("nan"), float("nan")
+    return bootstrap(values, lambda x: float(np.mean(x)), resamples=RESAMPLES)
+
+
+def _write(path: Path, names: Sequence[str], rows: list[dict[str, Any]]) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def read_answers(folder: Path) -> Answers:
+    """Read the diaries of a study's participants."""
+    games: list[dict[str, Any]] = []
+    answers: list[dict[str, Any]] = []
+    participants = complete = 0
+    for _, rows in diaries(folder):
+        first = rows[0]
+        if first["role"] != "participant":
+            continue
+        participants += 1
+        who = {"participant": first["code"], "number": first["number"]}
+        for row in rows[1:]:
+            both = {**who, **row}
+            if row["kind"] == "game":
+                games.append({k: both[k] for k in GAMES})
+            elif row["kind"] == "answer":
+                answers.append({k: both[k] for k in ANSWERS})
+            elif row["kind"] == "end":
+                complete += row["reason"] == "complete"
+    return Answers(games, answers, participants, complete)

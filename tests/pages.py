@@ -1,0 +1,57 @@
+"""What tests of the page share: messages, a running server, a page in a browser."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+
+
+def line(kind, **fields):
+    return json.dumps({"t": kind, **fields})
+
+
+def aim(x, y, q=1):
+    return line("aim", x=x, y=y, q=q, rtt=0)
+
+
+@contextlib.contextmanager
+def running(*words):
+    command = [sys.executable, "-m", "marl_airhockey.cli", *words]
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "BROWSER": "true"},
+    )
+    try:
+        yield re.search(r"http://\S+", process.stdout.readline())[0], process
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(10)
+        process.stdout.close()
+
+
+def page_at(browser, address, complaints, **options):
+    page = browser.new_page(
+        viewport={"width": 1000, "height": 600}, bypass_csp=True, **options
+    )
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on(
+        "console", lambda m: complaints.append(m.text) if m.type == "error" else None
+    )
+    page.goto(address)
+    page.wait_for_function("window.airhockey.frames.length > 5")
+    return page
+
+
+def state_of(page):
+    return page.evaluate("window.airhockey.state()")
+
+
+def wait(page, condition):
+    page.wait_for_function(
+        f"(() => {{ const s = airhockey.state(); return {condition}; }})()"
+    )
