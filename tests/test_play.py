@@ -16,7 +16,7 @@ import websockets
 from pages import aim, line, page_at, running, state_of, wait
 from PIL import Image
 
-from marl_airhockey.play.court import RATE, Court, Fairness
+from marl_airhockey.play.court import RATE, STRENGTHS, Court, Fairness
 from marl_airhockey.play.film import film
 from marl_airhockey.play.protocol import BURST, LARGEST, Meter, parse
 from marl_airhockey.play.recorder import Recorder, read
@@ -182,6 +182,10 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
     assert court.who[1] == "zoo/duel", "only who is offered may be asked"
     session.hear(guest, line("opponent", seat=1, name="allround:strength=weak"))
     assert court.who == ["person", "allround:strength=weak"]
+    session.hear(guest, line("strength", name="gentle"))
+    assert court.fairness == STRENGTHS["gentle"]
+    session.hear(guest, line("strength", name="divine"))
+    assert court.fairness == STRENGTHS["gentle"], "only what is offered"
     session.hear(guest, line("swap"))
     assert court.who == ["allround:strength=weak", "person"]
     assert guest.seat == 1
@@ -585,5 +589,11 @@ def test_a_recording_is_watched_in_the_page(browser, tmp_path):
         page.locator("#speed").select_option("4")
         page.locator("#pause").click()
         wait(page, "s.n > 260")
+        page.get_by_text("Broken off").wait_for()
+        page.locator("#scrub").fill("0")
+        wait(page, "s.n === 0")
+        page.locator("#scrub").fill(page.locator("#scrub").get_attribute("max"))
+        page.get_by_text("Broken off").wait_for()
+        page.get_by_text("enough").wait_for()
         page.close()
     assert not complaints

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from marl_airhockey.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.play.report import RESAMPLES
 from marl_airhockey.stats import bootstrap, interval
 from marl_airhockey.study.archive import diaries
-from marl_airhockey.study.plan import QUESTIONS
+from marl_airhockey.study.plan import POINTS, QUESTIONS
 
 GAMES = ("participant", "number", "block", "game", "practice", "opponent", "result")
 ANSWERS = ("participant", "number", "block", "opponent", "question", "value")
@@ -39,8 +40,9 @@ class Answers:
         For "origin" it is the share that said "a person".
         """
         rows = []
-        keys = sorted({(row["question"], row["opponent"]) for row in self.answers})
-        for question, opponent in keys:
+        asked = dict.fromkeys(row["question"] for row in self.answers)
+        met = sorted({row["opponent"] for row in self.answers})
+        for question, opponent in itertools.product(asked, met):
             values = np.array(
                 [
                     row["value"]
@@ -48,6 +50,8 @@ class Answers:
                     if (row["question"], row["opponent"]) == (question, opponent)
                 ]
             )
+            if not len(values):
+                continue
             if question == ORIGIN.id:
                 share = float((values == 1).mean())
                 middle = [share, *interval(share, len(values))]
@@ -79,7 +83,8 @@ class Answers:
             )
         lines += [
             "",
-            f"{ORIGIN.id}: share that said {ORIGIN.choices[0]!r}; the others 1 to 7.",
+            f"{ORIGIN.id}: share that said {ORIGIN.choices[0]!r}; "
+            f"the others 1 to {POINTS}.",
         ]
         return "\n".join(lines) + "\n"
 
@@ -98,8 +103,8 @@ class Answers:
 
     def _draw(self, path: Path) -> None:
         rows = self.table()
-        questions = sorted({row["question"] for row in rows})
-        opponents = sorted({row["opponent"] for row in rows})
+        questions = list(dict.fromkeys(row["question"] for row in rows))
+        opponents = list(dict.fromkeys(row["opponent"] for row in rows))
         figure, grid = plt.subplots(
             1,
             max(len(questions), 1),
@@ -119,7 +124,8 @@ class Answers:
                 axes.plot(middle, at, "o", color=INK)
             shares = question == ORIGIN.id
             axes.set(
-                xlim=(-0.03, 1.03) if shares else (0.8, 7.2),
+                xlim=(-0.05, 1.05) if shares else (0.7, POINTS + 0.3),
+                xticks=(0, 0.5, 1) if shares else range(1, POINTS + 1),
                 xlabel='said "a person"' if shares else question,
             )
             axes.set_yticks(range(len(opponents)), opponents)

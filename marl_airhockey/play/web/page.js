@@ -435,7 +435,7 @@ function replayWords() {
 }
 
 function notice(sits, free, say) {
-  $("stop").hidden = court.study || now.phase !== "pause" || !say;
+  $("stop").hidden = now.phase !== "pause" || !say;
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.left)), "", "", true);
   else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${court.what} Move the pointer to move your paddle. Space starts.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
@@ -488,7 +488,7 @@ function seats(free) {
     const box = document.createElement("span"), dot = document.createElement("span");
     box.className = "seat" + (i === now.seat ? " me" : ""); dot.className = "dot"; dot.style.background = colour(i); box.append(dot);
     if (i === now.seat || (seat.who === "person" && seat.taken)) box.append(titleOf(i));
-    else if (now.seat !== null && can) {
+    else if (now.seat !== null && can && !court.study) {
       const list = document.createElement("select");
       list.setAttribute("aria-label", `who plays seat ${i + 1}`);
       for (const name of [...new Set(["person", seat.who, ...court.choices])]) {

@@ -65,7 +65,7 @@ const SHEETS = {
 
 function studyWords() {
   const { stage, code } = now.study, runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
-  for (const name of ["swap", "leave", "strength"]) $(name).hidden = true;
+  for (const name of ["swap", "leave", "strength", "stop"]) $(name).hidden = true;
   put($("pause"), runs ? "Pause" : "Start");
   $("pause").disabled = !sits || !(stage === "match" || (stage === "ready" && !now.study.waits));
   $("withdraw").hidden = !code;
