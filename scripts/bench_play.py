@@ -34,7 +34,8 @@ from rich.table import Table
 
 ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 POINTER_RATE = 60
-"""Pointer events per second and player."""
+"""Pointer events per second and player, at moments drawn at random: browser, server and
+pointer run at nearly the same rate, and one would measure their phases."""
 
 
 def serve(*options: str) -> tuple[str, subprocess.Popen[str]]:
@@ -96,6 +97,7 @@ def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
         boxes.append(box)
         page.evaluate("airhockey.frames.length = airhockey.latencies.length = 0")
     rates: list[float] = []
+    rng = np.random.default_rng(0)
     began, used, events = time.perf_counter(), cpu(pid), 0
     while time.perf_counter() - began < seconds:
         angle = 3.0 * (time.perf_counter() - began)
@@ -106,7 +108,8 @@ def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
         events += 1
         if events % POINTER_RATE == 0:
             rates.append(float(pages[0].evaluate("airhockey.state().rate")))
-        time.sleep(max(0.0, began + events / POINTER_RATE - time.perf_counter()))
+        due = began + (events + rng.random()) / POINTER_RATE
+        time.sleep(max(0.0, due - time.perf_counter()))
     spent = time.perf_counter() - began
     used = cpu(pid) - used
     late: list[float] = []

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import re
+import socket
 import subprocess
 import sys
 import time
@@ -21,6 +22,7 @@ from marl_airhockey.play.film import film
 from marl_airhockey.play.protocol import BURST, LARGEST, Meter, parse
 from marl_airhockey.play.recorder import Recorder, read
 from marl_airhockey.play.report import _comes, _reactions, report
+from marl_airhockey.play.server import listen as listen_at
 from marl_airhockey.play.session import IDLE, Session
 from marl_airhockey.registry import scenario_names
 
@@ -420,6 +422,28 @@ async def chatter(socket):
     for q in range(5000):
         await socket.send(aim(0, 0, q))
     await listen(socket)
+
+
+def test_frames_are_not_held_back_for_acknowledgements():
+    async def option_of_a_connection():
+        loop, server_socket = asyncio.get_running_loop(), listen_at("127.0.0.1", 0)
+        taken = loop.create_future()
+
+        class Taker(asyncio.Protocol):
+            def connection_made(self, transport):
+                taken.set_result(transport)
+
+        server = await loop.create_server(Taker, sock=server_socket)
+        with socket.create_connection(server_socket.getsockname()):
+            transport = await taken
+            accepted = transport.get_extra_info("socket")
+            found = accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+            transport.abort()
+        server.close()
+        await server.wait_closed()
+        return found
+
+    assert asyncio.run(option_of_a_connection())
 
 
 def test_bad_guests_do_not_disturb_a_game():

@@ -164,7 +164,9 @@ def listen(host: str, port: int) -> socket.socket:
         ValueError: an address that is taken or not ours.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    server = socket.socket(family, socket.SOCK_STREAM)
+    # Said to be TCP, so that asyncio turns Nagle's algorithm off: it would hold each
+    # frame back until the page has acknowledged the last one.
+    server = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         server.bind((host, port))
