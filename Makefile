@@ -13,12 +13,15 @@ help: ## Show what there is to make
 setup: $(READY) ## Set up .venv with all that demo and tests need
 
 # torch comes first and by itself: pip then takes a CPU build where there is one.
+# robosuite comes without what it names: that is numpy 1, a second OpenCV and a compiler.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,ecosystem,dev]'
+	$(BIN)/pip install --quiet --constraint constraints.txt --no-deps robosuite
+	$(BIN)/pip install --quiet --constraint constraints.txt mujoco scipy termcolor tqdm
 	touch $@
 
 demo: setup ## Train a paddle to juggle and show it (a minute)

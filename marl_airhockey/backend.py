@@ -42,6 +42,8 @@ class Backend(ABC):
 
     exact: ClassVar[bool]
     """True if row i does not depend on the number of worlds, to the bit."""
+    ideal: ClassVar[bool] = True
+    """True if paddles move exactly as they are told and contacts take no time."""
     realtime: ClassVar[bool] = False
     """True if a step takes as long as it lasts."""
     default_substeps: ClassVar[int]

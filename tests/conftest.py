@@ -1,4 +1,5 @@
 import contextlib
+import importlib
 import os
 import shutil
 from pathlib import Path
@@ -16,12 +17,17 @@ def seats(scenario):
     return len(ah.make_scenario(scenario).cast.seats)
 
 
+def ideal_backends():
+    modules = {n: f"marl_airhockey.backends.{n}" for n in ah.backend_names()}
+    return [n for n, m in modules.items() if importlib.import_module(m).make.ideal]
+
+
 def pytest_generate_tests(metafunc):
     """Every test that asks for a scenario, backend or agent gets all there are."""
     found = {
         "scenario": ah.scenario_names,
         "single": lambda: [n for n in ah.scenario_names() if seats(n) == 1],
-        "backend": ah.backend_names,
+        "backend": ideal_backends,
         "agent": lambda: [n for n in ah.agent_names() if n != "policy"],
         "goal_scenario": lambda: GOALS,
     }

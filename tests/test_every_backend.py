@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from conftest import ideal_backends
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pair import Pair
@@ -219,7 +220,7 @@ def energy(state, pull):
     restitution=st.floats(0.3, 1.0),
 )
 def test_energy_never_rises_without_a_paddle(seed, pucks, tilt, restitution):
-    for backend in ah.backend_names():
+    for backend in ideal_backends():
         physics = {"tilt": tilt, "wall_restitution": restitution, "puck_damping": 0.05}
         bench = Bench(backend, physics, pucks=pucks)
         rng = np.random.default_rng(seed)
@@ -250,7 +251,7 @@ def test_energy_never_rises_without_a_paddle(seed, pucks, tilt, restitution):
 )
 def test_whatever_the_actions_nothing_impossible_happens(seed, seats, chase, delay):
     """Reach, acceleration, table, speeds and separate paddles, two seats, a mouth."""
-    for backend in ah.backend_names():
+    for backend in ideal_backends():
         world = ah.make_world(
             Pair(seats=seats), 4, backend=backend, physics={"action_delay": delay}
         )

@@ -32,6 +32,7 @@ LAYERS = (
         "discs",
         "coast",
         "kernel",
+        "arm",
         "registry",
         "registration",
     },

@@ -1,0 +1,162 @@
+"""A UR5e a seat on a table in MuJoCo, built with robosuite."""
+
+from __future__ import annotations
+
+import copy
+import importlib.util
+import logging
+from dataclasses import replace
+from importlib import metadata
+from typing import Any, ClassVar
+
+import numpy as np
+
+from marl_airhockey.backend import Backend, Command
+from marl_airhockey.cast import Cast
+from marl_airhockey.state import Array, State
+from marl_airhockey.table import TABLES, make_seat
+
+TESTED = "robosuite==1.5.2", "mujoco==3.9.0"
+
+
+class Robosuite(Backend):
+    """B MuJoCo simulations of robosuite's model, stepped in compiled code.
+
+    Paddles track their command as an arm can, and feel the pucks; contacts take some
+    milliseconds. A told paddle is asked to go there, at its seat's top speed at most.
+    ``trace`` has what the arms did at every physics step, (B, substeps, seats, 6).
+    """
+
+    exact: ClassVar[bool] = True
+    ideal: ClassVar[bool] = False
+    default_substeps: ClassVar[int] = 50
+
+    @classmethod
+    def available(cls) -> str | None:
+        for name in ("robosuite", "mujoco"):
+            if importlib.util.find_spec(name) is None:
+                return (
+                    f"{name} is not installed: pip install 'marl_airhockey[robosuite]'"
+                )
+        version = metadata.version("mujoco")
+        if tuple(int(n) for n in version.split(".")[:2]) > (3, 9):
+            return f"mujoco {version} is too new for robosuite: pip install {TESTED[1]}"
+        return None
+
+    @classmethod
+    def supports(cls, cast: Cast) -> str | None:
+        table, seats = cast.table, cast.seats
+        if table.vertices != TABLES["standard"].vertices:
+            return "arms are placed for the standard table"
+        sides = [seat.side for seat in seats]
+        if len(set(sides)) < len(sides) or not set(sides) <= {0, 2}:
+            return "there is room for one arm at each end"
+        for i, seat in enumerate(seats):
+            held = make_seat("robot", table, seat.side)
+            if seat.reach != held.reach or seat.speed > held.speed:
+                return f"an arm cannot hold the seat of paddle_{i}: say seats='robot'"
+        if cast.blocks and any(mouth.width for mouth in cast.mouths):
+            return "blocks could slide into a goal mouth; leave out one or the other"
+        return None
+
+    def __init__(
+        self, cast: Cast, num_worlds: int, control_dt: float, substeps: int
+    ) -> None:
+        super().__init__(cast, num_worlds, control_dt, substeps)
+        # Robosuite warns of files that nobody needs; errors are shown.
+        log = logging.getLogger("robosuite_logs")
+        log.addFilter(lambda record: record.levelno >= logging.ERROR)
+        from marl_airhockey.arm.lean import Table
+        from marl_airhockey.arm.robot import AirHockey
+        from marl_airhockey.arm.world import Arms
+
+        self._dt = control_dt / substeps
+        env: Any = AirHockey(cast=cast, timestep=self._dt, control_freq=1 / control_dt)
+        env.reset()
+        model, data = env.sim.model._model, env.sim.data._data
+        self.env = env
+        """The robosuite environment whose model the worlds share."""
+        place, mouths = env.place, cast.mouths
+        self._table = Table(
+            origin=place.origin,
+            rotation=place.rotation,
+            grips=np.array([hand.grip for hand in env.hands]),
+            gains=env.hands[0].gains,
+            low=np.array([hand._low for hand in env.hands]),
+            high=np.array([hand._high for hand in env.hands]),
+            radius=np.array([cast.table.paddle_radius, cast.table.puck_radius]),
+            pucks=cast.pucks,
+            normals=np.array([cast.table.normals[m.side] for m in mouths]).reshape(
+                -1, 2
+            ),
+            offsets=np.array([cast.table.offsets[m.side] for m in mouths]),
+            ways=np.array([cast.opening(m) for m in mouths]).reshape(-1, 2, 2),
+            whole=np.array([m.width is None for m in mouths], np.bool_),
+        )
+        self.trace = np.zeros((num_worlds, substeps, len(cast.seats), 6))
+        self.worlds = [
+            Arms(env, copy.copy(model), self._path_shape[1:], self.trace[i], data)
+            for i in range(num_worlds)
+        ]
+        self._old = np.zeros((num_worlds, len(cast.seats), 2))
+        self.state = self.quiet
+
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        for i in worlds.tolist():
+            row = {name: float(value[i]) for name, value in values.items()}
+            self.worlds[i].surface.set_physics(row)
+
+    def start(self, state: State, worlds: Array) -> None:
+        self.state = state
+        for i in worlds.tolist():
+            new = self.worlds[i].start(
+                self._table, state.position[i], state.velocity[i], state.angle[i]
+            )
+            if new:
+                self._old[i] = 0.0
+
+    def step(self, command: Command) -> State:
+        from marl_airhockey.arm.lean import advance
+
+        velocity, told, _ = self._follow(command, self.state.position)
+        top = np.array([seat.speed for seat in self.cast.seats])[:, None]
+        size = np.hypot(velocity[..., 0], velocity[..., 1])[..., None]
+        slow = np.minimum(1.0, top / np.maximum(size, 1e-9))
+        goal = np.where(told[..., None], velocity * slow, velocity)
+        arrays: dict[str, Any] = {
+            name: getattr(self.state, name).copy()
+            for name in ("position", "velocity", "angle", "spin")
+        }
+        events: dict[str, list[Array]] = {}
+        path = np.empty(self._path_shape)
+        for i, world in enumerate(self.worlds):
+            start = world.lead(self._old[i], goal[i], self.control_dt)
+            advance(
+                world.sim,
+                self._table,
+                world.report,
+                start,
+                self._old[i],
+                goal[i],
+                self._dt,
+                self.substeps,
+            )
+            world.read(arrays, i)
+            path[i] = world.report.path
+            for name, value in world.events.items():
+                events.setdefault(name, []).append(value.copy())
+        self._old[:] = goal
+        arrays |= {name: np.array(rows) for name, rows in events.items()}
+        self.state = replace(
+            self.quiet,
+            **arrays,
+            time=self.state.time + self.control_dt,
+            path=path if self.cast.path else None,
+        )
+        return self.state
+
+    def close(self) -> None:
+        self.env.close()
+
+
+make = Robosuite

@@ -1,0 +1,222 @@
+"""A UR5e in MuJoCo: contact kept, physics as set, the same on both paths, refusals."""
+
+import numpy as np
+import pytest
+
+import marl_airhockey as ah
+from marl_airhockey.backend import Command
+from marl_airhockey.cast import Cast, Mouth
+from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.registry import find_backend
+from marl_airhockey.starts import first_state
+from marl_airhockey.table import GRAVITY, TABLES, make_seat
+
+mujoco = pytest.importorskip("mujoco")
+pytest.importorskip("robosuite")
+
+TABLE, DT = TABLES["standard"], 0.05
+HOME = make_seat("robot", TABLE, 0)
+FASTEST = 0.9 * np.pi
+"""rad/s, of a UR5e's joints; what the robot seat promises"""
+HEIGHT, TILT, FORCE, JOINT, SHARE, SPEED = range(6)
+
+
+class Bench:
+    """One world with bodies where a test wants them."""
+
+    def __init__(self, physics=None, seats=(HOME,), **cast):
+        self.cast = Cast(TABLE, seats, **cast)
+        self.backend = find_backend("robosuite")(self.cast, 1, DT, 50)
+        values = {name: p.default for name, p in PARAMETERS.items()}
+        values.update({"tilt": 0.0, "puck_damping": 0.0}, **(physics or {}))
+        rows = {name: np.full(1, value) for name, value in values.items()}
+        self.backend.set_physics(rows, np.arange(1))
+
+    def start(self, paddle, *others):
+        state = first_state(self.cast, 1)
+        state.position[0, 0] = paddle
+        for i, (x, y, vx, vy) in enumerate(others, start=len(self.cast.seats)):
+            state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
+        self.backend.start(state, np.arange(1))
+        return self
+
+    def run(self, seconds, velocity=(0.0, 0.0)):
+        command = np.zeros((1, len(self.cast.seats), 2))
+        command[0, 0] = velocity
+        return [self.backend.step(Command(command)) for _ in range(round(seconds / DT))]
+
+
+@pytest.fixture(scope="module")
+def puck():
+    return Bench(pucks=1)
+
+
+def drive(world, driver, steps):
+    """The trace (steps * substeps, seats, 6) of a world under a rule."""
+    rows, positions = [], []
+    sent = world.reset(0)
+    for k in range(steps):
+        sent = world.step(driver(k, world))
+        rows.append(world.backend.trace[0].copy())
+        positions.append(world.state.paddle[0].copy())
+    assert sent is not None
+    return np.concatenate(rows), np.array(positions)
+
+
+def unsteady(rng):
+    return lambda k, world: rng.uniform(-1, 1, (1, len(world.open), 2))
+
+
+def sweeping(rng):
+    way = {}
+
+    def ask(k, world):
+        if k % 12 == 0:
+            angle = rng.uniform(0, 2 * np.pi, len(world.open))
+            way["now"] = np.stack([np.cos(angle), np.sin(angle)], -1)[None]
+        return way["now"]
+
+    return ask
+
+
+@pytest.mark.parametrize("rule", [unsteady, sweeping])
+def test_the_paddle_stays_on_the_table(rule):
+    world = ah.make_world("juggle", backend="robosuite")
+    trace, positions = drive(world, rule(np.random.default_rng(1)), 200)
+    assert np.abs(trace[..., HEIGHT]).max() < 1e-3
+    assert np.degrees(trace[..., TILT].max()) < 1.0
+    assert trace[..., FORCE].mean() == pytest.approx(20.0, rel=0.2)
+    assert trace[..., JOINT].max() < FASTEST
+    assert trace[..., SPEED].max() < 0.7 + 0.05
+    corners = np.array(HOME.reach)
+    assert (positions[:, 0] > corners.min(0) - 0.003).all()
+    assert (positions[:, 0] < corners.max(0) + 0.003).all()
+    world.close()
+
+
+def test_a_paddle_follows_its_command(puck):
+    puck.start((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
+    states = puck.run(0.4, velocity=(0.3, -0.2))
+    np.testing.assert_allclose(states[-1].paddle_velocity[0, 0], (0.3, -0.2), atol=0.01)
+    way = np.array((0.3, -0.2)) * (0.4 - DT / 2)
+    np.testing.assert_allclose(
+        states[-1].paddle[0, 0], np.array((-0.6, 0.0)) + way, atol=0.005
+    )
+
+
+def test_a_puck_falls_as_the_table_is_tilted():
+    bench = Bench({"tilt": 5.5}, pucks=1)
+    pull = GRAVITY * np.sin(np.radians(5.5))
+    bench.start((-0.7, 0.2), (0.5, -0.2, 0.0, 0.0))
+    last = bench.run(0.5)[-1]
+    np.testing.assert_allclose(last.puck_velocity[0, 0, 0], -0.5 * pull, rtol=1e-3)
+    assert abs(last.puck_velocity[0, 0, 1]) < 1e-9
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0, 3.0, 5.0])
+@pytest.mark.parametrize("share", [0.6, 0.9])
+def test_walls_and_paddles_return_their_share(puck, speed, share):
+    names = ("wall_restitution", "paddle_restitution")
+    puck.backend.worlds[0].surface.set_physics(
+        {name: p.default for name, p in PARAMETERS.items()}
+        | {"tilt": 0.0, "puck_damping": 0.0}
+        | dict.fromkeys(names, share)
+    )
+    puck.start((-0.7, 0.15), (0.0, 0.0, 0.0, speed))
+    states = puck.run(0.3 / speed + 3 * DT)
+    turned = [s.puck_velocity[0, 0, 1] for s in states if s.puck_velocity[0, 0, 1] < 0]
+    # The first of these may lie within the contact.
+    assert -turned[1] / speed == pytest.approx(share, abs=0.03)
+    puck.start((-0.6, 0.0), (-0.4, 0.0, -speed, 0.0))
+    states = puck.run(0.13 / speed + 2 * DT)
+    assert states[-1].puck_velocity[0, 0, 0] / speed == pytest.approx(share, abs=0.03)
+    assert sum(s.touched[0, 0, 0] for s in states) == 1
+
+
+def test_drag_and_friction_are_those_of_the_other_backends():
+    bench = Bench({"puck_damping": 0.8}, pucks=1, blocks=1)
+    bench.start((-0.7, 0.2), (-0.3, 0.0, 0.5, 0.0), (0.0, 0.2, 0.6, 0.0))
+    states = bench.run(1.0)
+    np.testing.assert_allclose(
+        states[-1].puck_velocity[0, 0, 0], 0.5 * np.exp(-0.8), rtol=5e-3
+    )
+    way = 0.6 / 0.8 - 2.4 / 0.8**2 * np.log(1 + 0.8 * 0.6 / 2.4)
+    assert states[-1].block[0, 0, 0] == pytest.approx(way, rel=0.02)
+    still = states[-1].block[0, 0]
+    np.testing.assert_allclose(bench.run(0.5)[-1].block[0, 0], still, atol=1e-6)
+
+
+def test_nothing_escapes():
+    rng, bench = np.random.default_rng(0), Bench(pucks=1)
+    for _ in range(25):
+        angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.2, 0.2, 2)
+        way = 5 * np.cos(angle), 5 * np.sin(angle)
+        bench.start((-0.6, 0.0), (*at, *way))
+        for state in bench.run(0.5):
+            x, y = np.abs(state.puck[0, 0])
+            assert x < 0.8382
+            assert y < 0.3048
+
+
+def test_robosuites_own_steps_are_the_same():
+    rng, bench = np.random.default_rng(3), Bench(pucks=1)
+    env = bench.backend.env
+    env.reset()
+    env.surface.set_physics(
+        {name: p.default for name, p in PARAMETERS.items()}
+        | {"tilt": 0.0, "puck_damping": 0.0}
+    )
+    home = env.hands[0].home
+    bench.start(home, (-0.3, 0.02, 0.0, 0.0))
+    data, own = env.sim.data._data, bench.backend.worlds[0].data
+    data.qpos[:], data.qvel[:] = own.qpos, own.qvel
+    env.sim.forward()
+    env.hands[0].rest()
+    furthest = 0.0
+    for _ in range(40):
+        env.step(rng.uniform(-1, 1, 2))
+        sent = env.hands[0].new[None, None]
+        state = bench.backend.step(Command(sent))
+        way = env.hands[0]
+        mujoco.mj_kinematics(env.sim.model._model, data)
+        furthest = max(furthest, np.abs(way.position[:2] - state.paddle[0, 0]).max())
+        np.testing.assert_allclose(
+            data.qpos[bench.backend.worlds[0].surface.places[0]],
+            state.puck[0, 0, 0],
+            atol=1e-6,
+        )
+    assert furthest < 1e-6
+
+
+def test_two_arms_play_at_both_ends():
+    world = ah.make_world(
+        "rally", backend="robosuite", options={"seats": "robot"}, num_worlds=1
+    )
+    trace, positions = drive(world, unsteady(np.random.default_rng(0)), 60)
+    assert np.abs(trace[..., HEIGHT]).max() < 1e-3
+    assert (positions[:, 0, 0] < -0.3).all()
+    assert (positions[:, 1, 0] > 0.3).all()
+    world.close()
+
+
+def test_a_row_does_not_depend_on_the_others():
+    def run(worlds):
+        world = ah.make_world("touch", num_worlds=worlds, backend="robosuite")
+        world.reset(5)
+        for k in range(10):
+            world.step(np.full((worlds, 1, 2), np.sin(k)))
+        return world.state.position[0]
+
+    np.testing.assert_array_equal(run(1), run(3))
+
+
+def test_what_an_arm_cannot_do_is_refused():
+    for game, options, words in (
+        ("duel", {}, "seats='robot'"),
+        ("team_juggle", {}, "one arm at each end"),
+        ("free_for_all", {}, "standard table"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            ah.make_world(game, backend="robosuite", options=options)
+    far = Cast(TABLE, (HOME,), pucks=1, mouths=(Mouth("goal", 2, 0.3),), blocks=1)
+    assert "goal mouth" in find_backend("robosuite").supports(far)
