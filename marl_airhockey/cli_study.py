@@ -39,10 +39,15 @@ def orders(
     participants: Annotated[int, typer.Option(help="How many.", min=1)] = 12,
 ) -> None:
     """Print the order in which participants meet the opponents of a plan."""
+    need("starlette", "play")
     from marl_airhockey.study.plan import load
+    from marl_airhockey.study.study import open_court
 
     plan = load(file)
-    table = Table("participant", *(f"block {k + 1}" for k in range(plan.blocks)))
+    open_court(plan).close()
+    table = Table("participant")
+    for k in range(plan.blocks):
+        table.add_column(f"block {k + 1}", overflow="fold")
     for number in range(participants):
         labels = [o.label for o in plan.opponents] or [plan.scenario]
         table.add_row(str(number), *(labels[k] for k in plan.sequence(number)))
@@ -61,15 +66,43 @@ def run(
     need("starlette", "play")
     need("uvicorn", "play")
     from marl_airhockey.play.server import application
+    from marl_airhockey.study.archive import claim
     from marl_airhockey.study.plan import load
     from marl_airhockey.study.study import Study
 
     plan = load(file)
+    claim(out, file)
     with console.status("preparing the table (longer when it is the first time)"):
         session = Study(plan, out)
     host_table(lambda door: application(session, door), plan.title, host, port, browser)
     if session.failure is not None:
         raise session.failure
+
+
+@study.command("list")
+def list_participants(
+    folder: Annotated[Path, typer.Argument(help="Of the study.")],
+) -> None:
+    """List participants: number, code, how far they came."""
+    from marl_airhockey.study.archive import diaries
+
+    table = Table("number", "code", "began", "games", "blocks answered", "state")
+    for diary in diaries(folder):
+        rows = diary.rows
+        if rows[0]["role"] != "participant":
+            continue
+        games = [row for row in rows if row["kind"] == "game" and not row["practice"]]
+        blocks = {row["block"] for row in rows if row["kind"] == "answer"}
+        ends = [row["reason"] for row in rows if row["kind"] == "end"]
+        table.add_row(
+            str(diary.number),
+            diary.code,
+            rows[0]["at"][:16],
+            str(len(games)),
+            str(len(blocks)),
+            ends[0] if ends else "not ended",
+        )
+    console.print(table)
 
 
 @study.command()
@@ -81,3 +114,4 @@ def erase(
     from marl_airhockey.study.archive import erase as delete
 
     console.print(f"erased {delete(folder, code)} files of {code}")
+    console.print("reports elsewhere may still name them: make them again")

@@ -11,9 +11,9 @@ from pages import aim, line, page_at, running, wait
 from marl_airhockey.play.court import RATE
 from marl_airhockey.play.recorder import head
 from marl_airhockey.play.report import report
-from marl_airhockey.play.session import GONE, IDLE
+from marl_airhockey.play.session import GONE, GRACE, IDLE
 from marl_airhockey.study.answers import read_answers
-from marl_airhockey.study.archive import diaries, erase
+from marl_airhockey.study.archive import claim, diaries, erase
 from marl_airhockey.study.plan import EXAMPLE, Opponent, Plan, load
 from marl_airhockey.study.study import ABSENT, Study
 
@@ -118,6 +118,9 @@ def test_the_order_can_be_drawn_or_fixed_and_follows_the_seed(plan):
         ('"still", {', '"striker (reaction 0.1)", {', "there twice"),
         ("reaction = 100", "speed = 1", "speed: unknown; an opponent has"),
         ('name = "striker"', 'label = "x"', "an opponent lacks 'name'|lacks.*name"),
+        ('id = "fun"', 'id = "Fun!"', "must be of a-z"),
+        ('text = "Fun?"', 'text = "Fun?", choices = ["x"]', "at least two"),
+        ("games = 1", 'digest = "x"', "digest: unknown"),
         ('"origin"', '"mood"', "'mood' is not shipped"),
         ("reaction = 100", "reaction = 900", "reaction"),
         ('"still", {', '"nobody", {', "unknown driver"),
@@ -141,7 +144,7 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     assert guest.seat is None
     study.hear(guest, line("start"))
     assert study.court.phase == "lobby"
-    assert not out.exists(), "nothing is kept before the consent"
+    assert not list(out.rglob("*.jsonl")), "nothing is kept before the consent"
     with pytest.raises(ValueError, match="load the page again"):
         study.hear(guest, line("consent", version="2"))
     consent(study, guest)
@@ -173,12 +176,12 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     texts = json.dumps(study.describe())
     assert "striker" not in texts, "who is met stays with the leader"
     (found,) = diaries(out)
-    assert [row["kind"] for row in found[1]] == [
+    assert [row["kind"] for row in found.rows] == [
         *("diary", "consent", "game", "game", "answer", "answer"),
         *("game", "answer", "answer", "end"),
     ]
-    assert found[1][1]["version"] == "3"
-    metas = [head(path) for path in sorted(found[0].parent.glob("*duel.jsonl"))]
+    assert found.rows[1]["version"] == "3"
+    metas = [head(path) for path in sorted(found.folder.glob("*duel.jsonl"))]
     assert [meta["study"]["practice"] for meta in metas] == [True, False, False]
     assert metas[1]["players"][0]["person"] == code
     assert metas[1]["players"][0]["consent"] == "3"
@@ -215,7 +218,7 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     play(study, second)
     code = stage(study, second)["code"]
     (found,) = diaries(out)
-    assert found[1][0]["number"] == 0
+    assert found.number == 0
     with pytest.raises(ValueError, match="nothing of 'xyz'"):
         erase(out, "xyz")
     assert erase(out, code) == 2
@@ -268,16 +271,70 @@ def test_a_participant_who_goes_may_come_back_or_is_given_up(plan, tmp_path):
     study.part(back)
     study._let_go(time.monotonic() + IDLE + ABSENT + 2)
     assert study.subject is None
-    ((_, rows),) = diaries(tmp_path / "out")
-    assert rows[-1]["reason"] == "left"
+    (diary,) = diaries(tmp_path / "out")
+    assert diary.rows[-1]["reason"] == "left"
     other = enter(study, "b")
     assert stage(study, other) == {"stage": "consent"}
     consent(study, other)
     study.hear(other, aim(-0.4, 0.0))
     play(study, other)
-    for _, rows in diaries(tmp_path / "out"):
-        assert rows[0]["role"] == "participant"
-    assert sorted(rows[0]["number"] for _, rows in diaries(tmp_path / "out")) == [0, 1]
+    found = list(diaries(tmp_path / "out"))
+    assert {diary.rows[0]["role"] for diary in found} == {"participant"}
+    assert sorted(diary.number for diary in found) == [0, 1]
+
+
+def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
+    out = tmp_path / "out"
+    study = Study(plan(), out)
+    guest = enter(study, "a")
+    consent(study, guest)
+    code = stage(study, guest)["code"]
+    for _ in range(2):
+        play(study, guest)
+    answer(study, guest)
+    first = study.court.who[1]
+    study = Study(plan(), out)
+    other, guest = enter(study, "b"), enter(study, "a")
+    assert stage(study, other)["stage"] == "busy"
+    again = stage(study, guest)
+    assert (again["code"], again["stage"], again["block"]) == (code, "ready", 1)
+    assert study.court.who[1] == first, "the second opponent, as before"
+    play(study, guest)
+    study = Study(plan(), out)
+    guest = enter(study, "a")
+    while stage(study, guest)["stage"] == "over":
+        pass
+    assert stage(study, guest)["stage"] == "questions"
+    answer(study, guest)
+    assert stage(study, guest)["stage"] == "end"
+    study.part(guest)
+    study._let_go(time.monotonic() + GRACE + 1)
+    assert study.subject is None, "who is through lets the next one in"
+    asked = read_answers(out)
+    assert (asked.participants, asked.complete, len(asked.answers)) == (1, 1, 4)
+    assert {row["choice"] for row in asked.answers} == {"a program", ""}
+    assert {row["question"] for row in asked.table()} == {"origin: a program", "fun"}
+
+
+def test_whom_the_leader_erases_is_out(plan, tmp_path):
+    study = Study(plan(), tmp_path / "out")
+    guest = enter(study, "a")
+    consent(study, guest)
+    erase(tmp_path / "out", stage(study, guest)["code"])
+    study.hear(guest, line("start"))
+    assert stage(study, guest) == {"stage": "erased"}
+    consent(study, enter(study, "b"))
+
+
+def test_a_folder_is_that_of_one_plan(plan, tmp_path):
+    plan()
+    claim(tmp_path / "out", tmp_path / "plan.toml")
+    claim(tmp_path / "out", tmp_path / "plan.toml")
+    plan(PLAN.replace("games = 1", "games = 2"))
+    with pytest.raises(ValueError, match="another plan"):
+        claim(tmp_path / "out", tmp_path / "plan.toml")
+    with pytest.raises(ValueError, match=r"--out .*exists"):
+        claim(tmp_path / "plan.toml", tmp_path / "plan.toml")
 
 
 def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
@@ -346,4 +403,4 @@ def test_a_participant_in_the_browser(browser, plan, tmp_path):
         page.get_by_role("button", name="Take part").wait_for()
         page.close()
     assert not complaints
-    assert [path.name for path in (tmp_path / "o").rglob("*.jsonl")] == ["erased.jsonl"]
+    assert [p.name for p in (tmp_path / "o").rglob("*.jsonl")] == ["erased.jsonl"]

@@ -7,8 +7,8 @@ import numpy as np
 from marl_airhockey.state import Array
 
 STIFFNESS = 0.2
-"""Root of a contact's stiffness times the time step. In a stiffer one the damping of the
-first, partial step would count: a share would vary by the moment of contact."""
+"""Root of a contact's stiffness times the time step. In a stiffer one the first step,
+which is partial, counts: what returns then depends on the moment of the contact."""
 
 
 def returned(ratio: Array) -> Array:

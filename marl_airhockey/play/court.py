@@ -108,7 +108,7 @@ class Court:
         self.phase: Phase = "lobby"
         self.opening: dict[str, Any] = {}
         """What `state` was before the first step of this episode."""
-        self.number, self.ticks, self.left = 0, 0, 0.0
+        self.number, self.ticks, self.left, self.pauses = 0, 0, 0.0, 0
         self.reason = ""
         self.events: list[list[Any]] = []
         self.result: Step | None = None
@@ -215,7 +215,7 @@ class Court:
 
     def _begin(self) -> None:
         """What a new episode needs."""
-        self.ticks, self.result, self.events = 0, None, []
+        self.ticks, self.pauses, self.result, self.events = 0, 0, None, []
         self.number += 1
         self._start_drivers(range(len(self.seats)))
         self.opening = self.state()
@@ -248,6 +248,7 @@ class Court:
         """Hold a running match."""
         if self.phase in ("play", "countdown"):
             self.phase, self.reason = "pause", reason
+            self.pauses += 1
 
     def end(self, reason: str) -> None:
         """Break a match off: nobody has won."""

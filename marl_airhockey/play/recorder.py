@@ -39,6 +39,8 @@ class Recorder:
         self.notes: dict[str, Any] = {}
         """What else the first line of a file says, under "study"."""
         self._file: TextIO | None = None
+        self.path: Path | None = None
+        """Of the last file."""
         self._synced = 0.0
 
     def begin(self, court: Court, players: list[dict[str, Any]]) -> Path:
@@ -47,7 +49,7 @@ class Recorder:
         now = datetime.datetime.now(datetime.UTC)
         scenario = court.world.scenario.name
         stamp = now.strftime("%Y%m%d-%H%M%S-%f")
-        path = self._folder / f"{stamp}-{scenario}.jsonl"
+        path = self.path = self._folder / f"{stamp}-{scenario}.jsonl"
         self._file = path.open("x")
         physics = court.world.episode.physics
         self._write(

@@ -132,9 +132,9 @@ class Report:
         ]
         for row in self.rows():
             lines.append(
-                f"| {row['player']} | {row['games']} | {_shown(row['score'], 2)} "
-                f"| {_shown(row['elo'], 0)} | {_shown(row['hit_rate'], 2)} "
-                f"| {_shown(row['reaction_ms'], 0)} | {_shown(row['shot_speed'], 2)} "
+                f"| {row['player']} | {row['games']} | {shown(row['score'], 2)} "
+                f"| {shown(row['elo'], 0)} | {shown(row['hit_rate'], 2)} "
+                f"| {shown(row['reaction_ms'], 0)} | {shown(row['shot_speed'], 2)} "
                 f"| {_number(row['shot_spread'], 3)} | {_number(row['limited'], 2)} "
                 f"| {_number(row['round_trip_ms'], 0)} |"
             )
@@ -319,7 +319,8 @@ def _number(value: float, digits: int) -> str:
     return "-" if np.isnan(value) else f"{value:.{digits}f}"
 
 
-def _shown(values: Sequence[float], digits: int) -> str:
+def shown(values: Sequence[float], digits: int) -> str:
+    """A figure with its interval, if it has one; "-" for none."""
     middle, low, high = values
     if np.isnan(middle):
         return "-"

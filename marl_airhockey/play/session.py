@@ -281,7 +281,8 @@ class Session:
             ),
             "watching": sum(guest.seat is None for guest in self.guests),
             "rate": round(self.rate, 1),
-            "recording": self.recorder is not None,
+            "recording": self.recorder is not None
+            and self.court.phase in ("countdown", "play", "pause"),
         }
 
     def _own(self, guest: Guest) -> dict[str, Any]:

@@ -13,14 +13,21 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from marl_airhockey.charts import DPI, INK, INKS, save, tidy
-from marl_airhockey.play.report import RESAMPLES
+from marl_airhockey.play.report import RESAMPLES, shown
 from marl_airhockey.stats import bootstrap, interval
 from marl_airhockey.study.archive import diaries
-from marl_airhockey.study.plan import POINTS, QUESTIONS
+from marl_airhockey.study.plan import POINTS
 
-GAMES = ("participant", "number", "block", "game", "practice", "opponent", "result")
-ANSWERS = ("participant", "number", "block", "opponent", "question", "value")
-ORIGIN = QUESTIONS["origin"]
+GAMES = (
+    *("participant", "number", "complete", "block", "game", "practice", "opponent"),
+    *("result", "score", "seconds", "pauses", "recording", "at"),
+)
+ANSWERS = (
+    *("participant", "number", "complete", "block", "opponent"),
+    *("question", "value", "choice", "at"),
+)
+FEWEST = 5
+"""Answers from which a mean has an interval."""
 
 
 @dataclass(frozen=True)
@@ -35,36 +42,33 @@ class Answers:
     complete: int
 
     def table(self) -> list[dict[str, Any]]:
-        """By opponent and question: the mean answer with its interval, (95 %).
+        """By question and opponent: the mean answer, 1 to 7, with its 95 % interval.
 
-        For "origin" it is the share that said "a person".
+        A question with choices has a row for each choice instead: the share that chose
+        it. ``scale`` is the largest value.
         """
         rows = []
         asked = dict.fromkeys(row["question"] for row in self.answers)
         met = sorted({row["opponent"] for row in self.answers})
         for question, opponent in itertools.product(asked, met):
-            values = np.array(
-                [
-                    row["value"]
-                    for row in self.answers
-                    if (row["question"], row["opponent"]) == (question, opponent)
-                ]
-            )
-            if not len(values):
-                continue
-            if question == ORIGIN.id:
-                share = float((values == 1).mean())
-                middle = [share, *interval(share, len(values))]
-            else:
+            mine = [
+                row
+                for row in self.answers
+                if (row["question"], row["opponent"]) == (question, opponent)
+            ]
+            of = {"opponent": opponent, "n": len(mine)}
+            chosen = [row["choice"] for row in mine if row["choice"]]
+            for choice in sorted(set(chosen)):
+                share = chosen.count(choice) / len(chosen)
+                middle = [share, *interval(share, len(chosen))]
+                name = f"{question}: {choice}"
+                rows.append({"question": name, **of, "scale": 1, "mean": middle})
+            if mine and not chosen:
+                values = np.array([row["value"] for row in mine])
                 middle = [float(values.mean()), *_bounds(values)]
-            rows.append(
-                {
-                    "question": question,
-                    "opponent": opponent,
-                    "n": len(values),
-                    "mean": middle,
-                }
-            )
+                rows.append(
+                    {"question": question, **of, "scale": POINTS, "mean": middle}
+                )
         return rows
 
     def to_markdown(self) -> str:
@@ -76,15 +80,14 @@ class Answers:
             "| --- | --- | --- | --- |",
         ]
         for row in self.table():
-            middle, low, high = row["mean"]
             lines.append(
                 f"| {row['question']} | {row['opponent']} | {row['n']} "
-                f"| {middle:.2f} ({low:.2f}..{high:.2f}) |"
+                f"| {shown(row['mean'], 2)} |"
             )
         lines += [
             "",
-            f"{ORIGIN.id}: share that said {ORIGIN.choices[0]!r}; "
-            f"the others 1 to {POINTS}.",
+            "With a choice: the share that chose it (Wilson's interval). Others: means "
+            f"of 1 to {POINTS} (bootstrap, from {FEWEST} answers on).",
         ]
         return "\n".join(lines) + "\n"
 
@@ -118,15 +121,22 @@ class Answers:
             for row in rows:
                 if row["question"] != question:
                     continue
-                at = opponents.index(row["opponent"])
+                at, scale = opponents.index(row["opponent"]), row["scale"]
                 middle, low, high = row["mean"]
                 axes.plot([low, high], [at, at], color=INKS[0], linewidth=2)
                 axes.plot(middle, at, "o", color=INK)
-            shares = question == ORIGIN.id
+                axes.annotate(
+                    f"n = {row['n']}",
+                    (middle, at),
+                    (0, 6),
+                    textcoords="offset points",
+                    ha="center",
+                    fontsize=7,
+                )
             axes.set(
-                xlim=(-0.05, 1.05) if shares else (0.7, POINTS + 0.3),
-                xticks=(0, 0.5, 1) if shares else range(1, POINTS + 1),
-                xlabel='said "a person"' if shares else question,
+                xlim=(-0.05, 1.05) if scale == 1 else (0.7, POINTS + 0.3),
+                xticks=(0, 0.5, 1) if scale == 1 else range(1, POINTS + 1),
+                xlabel=question,
             )
             axes.set_yticks(range(len(opponents)), opponents)
             tidy(axes, legend=None)
@@ -134,7 +144,7 @@ class Answers:
 
 
 def _bounds(values: Any) -> tuple[float, float]:
-    if len(values) < 2:
+    if len(values) < FEWEST:
         return float("nan"), float("nan")
     return bootstrap(values, lambda x: float(np.mean(x)), resamples=RESAMPLES)
 
@@ -151,18 +161,17 @@ def read_answers(folder: Path) -> Answers:
     games: list[dict[str, Any]] = []
     answers: list[dict[str, Any]] = []
     participants = complete = 0
-    for _, rows in diaries(folder):
-        first = rows[0]
+    for diary in diaries(folder):
+        first = diary.rows[0]
         if first["role"] != "participant":
             continue
-        participants += 1
-        who = {"participant": first["code"], "number": first["number"]}
-        for row in rows[1:]:
+        done = any(row.get("reason") == "complete" for row in diary.rows)
+        participants, complete = participants + 1, complete + done
+        who = {"participant": diary.code, "number": diary.number, "complete": done}
+        for row in diary.rows[1:]:
             both = {**who, **row}
             if row["kind"] == "game":
                 games.append({k: both[k] for k in GAMES})
             elif row["kind"] == "answer":
                 answers.append({k: both[k] for k in ANSWERS})
-            elif row["kind"] == "end":
-                complete += row["reason"] == "complete"
     return Answers(games, answers, participants, complete)

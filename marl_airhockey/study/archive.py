@@ -8,6 +8,7 @@ an opponent has a folder ``partner-000`` with the consent alone.
 from __future__ import annotations
 
 import datetime
+import hashlib
 import json
 import os
 import secrets
@@ -21,6 +22,11 @@ from marl_airhockey.study.plan import Plan
 
 FORMAT = 1
 DIARY = "diary.jsonl"
+REPORTS = (
+    *(f"report.{kind}" for kind in ("json", "md", "png")),
+    *("games.csv", "answers.csv", "answers.md", "answers.png"),
+)
+"""What `airhockey record report` writes."""
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 """Of codes; none that is mistaken for another."""
 
@@ -29,53 +35,108 @@ class Diary:
     """What is noted of one person; every line is on the disk when it is written.
 
     Args:
-        folder: of the study.
-        role: "participant" or "partner".
-        plan: of the study; a participant's order is that of the lowest free number, so
-            that whoever withdraws leaves no gap in the counterbalancing.
+        folder: of the person.
+        rows: its lines so far, the head first.
     """
 
-    def __init__(self, folder: Path, role: str, plan: Plan) -> None:
-        self.code = "".join(secrets.choice(LETTERS) for _ in range(8))
-        """By which the person is known, drawn at random."""
-        self.number, self.folder = _claim(folder, role)
-        self.order = plan.sequence(self.number)
-        self.write(
+    def __init__(self, folder: Path, rows: list[dict[str, Any]]) -> None:
+        self.folder, self.rows = folder, rows
+
+    @classmethod
+    def begin(cls, study: Path, role: str, plan: Plan, page: str) -> Diary:
+        """A new one, with the consent that has just been given.
+
+        Args:
+            study: its folder.
+            role: "participant" or "partner".
+            plan: of the study; a participant's order is that of the lowest free number,
+                so that whoever is erased leaves no gap in the counterbalancing.
+            page: key of the person's page, of which a digest is kept.
+        """
+        number, folder = _claim(study, role)
+        diary = cls(folder, [])
+        diary.write(
             "diary",
             format=FORMAT,
             role=role,
-            code=self.code,
-            number=self.number,
+            code="".join(secrets.choice(LETTERS) for _ in range(8)),
+            number=number,
             plan=plan.digest,
+            page=digest(page),
         )
-        self.write("consent", version=plan.version)
+        diary.write("consent", version=plan.version)
+        return diary
+
+    @property
+    def code(self) -> str:
+        """By which the person is known, drawn at random."""
+        return str(self.rows[0]["code"])
+
+    @property
+    def number(self) -> int:
+        """Of the participant, from 0."""
+        return int(self.rows[0]["number"])
+
+    @property
+    def over(self) -> bool:
+        """Whether the person has come to the end, or has left."""
+        return any(row["kind"] == "end" for row in self.rows)
+
+    @property
+    def there(self) -> bool:
+        """Whether it is still on the disk: somebody may have erased it."""
+        return (self.folder / DIARY).exists()
 
     def write(self, kind: str, **row: Any) -> None:
         """Add a line, with the time."""
         now = datetime.datetime.now(datetime.UTC).isoformat()
-        line = json.dumps({"kind": kind, "at": now, **row}, separators=(",", ":"))
+        self.rows.append({"kind": kind, "at": now, **row})
         with (self.folder / DIARY).open("a") as file:
-            file.write(line + "\n")
+            file.write(json.dumps(self.rows[-1], separators=(",", ":")) + "\n")
             file.flush()
             os.fsync(file.fileno())
 
 
+def digest(page: str) -> str:
+    """Of the key of a page, by which it is known again."""
+    return hashlib.sha256(page.encode()).hexdigest()[:16]
+
+
+def claim(folder: Path, plan: Path) -> None:
+    """Make a folder that of a plan, of which a copy is kept there.
+
+    Raises:
+        ValueError: it is another plan's, or cannot be written.
+    """
+    copy = folder / "plan.toml"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not copy.exists():
+            copy.write_bytes(plan.read_bytes())
+        same = copy.read_bytes() == plan.read_bytes()
+    except OSError as error:
+        raise ValueError(f"--out {folder}: {error.strerror}") from error
+    if not same:
+        raise ValueError(
+            f"--out {folder}: was made with another plan ({copy}); say another folder"
+        )
+
+
 def _claim(folder: Path, role: str) -> tuple[int, Path]:
     """The lowest free number, and its folder; servers of one study may race for it."""
-    folder.mkdir(parents=True, exist_ok=True)
     number = 0
     while True:
         own = folder / f"{role}-{number:03d}"
         try:
-            own.mkdir()
+            own.mkdir(parents=True)
         except FileExistsError:
             number += 1
             continue
         return number, own
 
 
-def diaries(folder: Path) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
-    """The diaries of a study: their files and lines.
+def diaries(folder: Path) -> Iterator[Diary]:
+    """The diaries of a study.
 
     Raises:
         ValueError: one of another format.
@@ -90,31 +151,34 @@ def diaries(folder: Path) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
         if rows and rows[0]["format"] != FORMAT:
             raise ValueError(f"{path}: format {rows[0]['format']}, expected {FORMAT}")
         if rows:
-            yield path, rows
+            yield Diary(path.parent, rows)
 
 
 def erase(folder: Path, who: str) -> int:
     """Delete all that is kept of a person; how many files it was.
 
-    The games that the person played as somebody's opponent go, too. A line without a
-    code stays in ``erased.jsonl``: when it was, and of which number.
+    The games that the person played as somebody's opponent go, too, and reports that
+    were made in the folder. A line without a code stays in ``erased.jsonl``: when it
+    was, and of which number.
 
     Raises:
         ValueError: nothing of this person is there.
     """
     gone = 0
     number = None
-    for path, rows in list(diaries(folder)):
-        if rows[0]["code"] == who:
-            number = rows[0]["number"]
-            gone += sum(p.is_file() for p in path.parent.rglob("*"))
-            shutil.rmtree(path.parent)
+    for diary in list(diaries(folder)):
+        if diary.code == who:
+            number = diary.number
+            gone += sum(p.is_file() for p in diary.folder.rglob("*"))
+            shutil.rmtree(diary.folder)
     for path in list(folder.rglob("*.jsonl")):
         if who in [player["person"] for player in head(path).get("players", [])]:
             path.unlink()
             gone += 1
     if not gone:
         raise ValueError(f"{folder}: there is nothing of {who!r}")
+    for name in REPORTS:
+        (folder / name).unlink(missing_ok=True)
     with (folder / "erased.jsonl").open("a") as log:
         now = datetime.datetime.now(datetime.UTC).isoformat()
         log.write(json.dumps({"at": now, "number": number, "files": gone}) + "\n")

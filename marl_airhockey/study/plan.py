@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -32,6 +33,12 @@ class Question:
     """Words at the lower end of the scale."""
     high: str = ""
     choices: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z0-9_]+", self.id):
+            raise ValueError(f"id: {self.id!r} must be of a-z, 0-9 and _")
+        if len(self.choices) == 1:
+            raise ValueError(f"choices: {self.id} needs at least two")
 
     @property
     def most(self) -> int:
@@ -77,6 +84,16 @@ class Opponent:
     def __post_init__(self) -> None:
         if self.name == PERSON and self.fairness != Fairness():
             raise ValueError("a person cannot be held back by a plan")
+        for name, low, most in (
+            ("reaction", 0, 300),
+            ("noise", 0, 1),
+            ("pace", 0.05, 1),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= most:
+                raise ValueError(
+                    f"{name}: {value:g} of {self.name} must be in {low} .. {most}"
+                )
         if not self.label:
             held = self.fairness.words
             label = f"{self.name} ({held})" if held else self.name
@@ -169,6 +186,8 @@ def load(path: Path) -> Plan:
         if "practice_opponent" in data:
             data["practice_opponent"] = _opponent(data["practice_opponent"])
         digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+        if "digest" in data:
+            raise ValueError("digest: unknown; it is made from the file")
         return _build(Plan, "the plan", {**data, "digest": digest})
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
@@ -220,7 +239,8 @@ def _build(kind: type[Part], what: str, row: Any) -> Part:
     known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
     for name, value in row.items():
         if name not in known:
-            raise ValueError(f"{name}: unknown; {what} has {', '.join(known)}")
+            open_ones = ", ".join(name for name in known if name != "digest")
+            raise ValueError(f"{name}: unknown; {what} has {open_ones}")
         wanted = _KINDS[str(known[name].type)]
         wrong = isinstance(value, bool) and bool not in wanted
         if wrong or not isinstance(value, wanted):
@@ -231,7 +251,7 @@ def _build(kind: type[Part], what: str, row: Any) -> Part:
     try:
         return kind(**texts)
     except TypeError as error:  # "missing 1 required positional argument: 'name'"
-        raise ValueError(f"{what} lacks {str(error).partition(':')[2]}") from error
+        raise ValueError(f"{what} lacks{str(error).partition(':')[2]}") from error
 
 
 def _balanced(count: int, seed: int, number: int) -> list[int]:

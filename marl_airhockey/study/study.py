@@ -9,14 +9,16 @@ from typing import Any
 
 from marl_airhockey.play.court import PERSON, RATE, Court
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.play.session import GONE, IDLE, Guest, Session
-from marl_airhockey.study.archive import Diary, erase
+from marl_airhockey.play.session import GONE, GRACE, IDLE, Guest, Session
+from marl_airhockey.study.archive import Diary, diaries, digest, erase
 from marl_airhockey.study.plan import Opponent, Plan
 
 ABSENT = 600.0
 """s after which a participant whose page is gone is held to have left."""
 VERDICT = 2.5
 """s for which the end of a game is shown before what comes next."""
+BROKEN = "broken off"
+"""Result of a game that does not count."""
 SUBJECT, PARTNER = 0, 1
 """Seats of the participant, and of a person whom the participant meets."""
 
@@ -47,6 +49,35 @@ class Subject(Person):
     answers: dict[str, int] = field(default_factory=dict)
 
 
+def open_court(plan: Plan) -> Court:
+    """The court of a plan.
+
+    Raises:
+        ValueError: a plan that cannot be played, an opponent named.
+    """
+    court = Court(
+        plan.scenario,
+        {},
+        {"backend": plan.backend, "profile": plan.profile, "options": plan.options},
+    )
+    seats = len(court.seats)
+    if (seats == 1) != (not plan.opponents):
+        need = "no opponents" if seats == 1 else "opponents"
+        raise ValueError(f"opponents: {plan.scenario} needs {need}")
+    if seats != 2 and PERSON in [opponent.name for opponent in plan.opponents]:
+        raise ValueError("opponents: a person can be met in a game of two seats")
+    for opponent in (plan.practice_opponent, *plan.opponents):
+        invite(court, opponent)
+    return court
+
+
+def invite(court: Court, opponent: Opponent) -> None:
+    """Give all seats but the participant's to an opponent."""
+    court.hold_back(opponent.fairness)
+    for i in range(1, len(court.seats)):
+        court.seat(i, opponent.name)
+
+
 class Study(Session):
     """A court at which one participant after the other goes through a plan.
 
@@ -64,36 +95,17 @@ class Study(Session):
     }
 
     def __init__(self, plan: Plan, folder: Path) -> None:
-        super().__init__(
-            Court(
-                plan.scenario,
-                {},
-                {
-                    "backend": plan.backend,
-                    "profile": plan.profile,
-                    "options": plan.options,
-                },
-            )
-        )
+        super().__init__(open_court(plan))
         self.plan, self.folder = plan, folder
         self.subject: Subject | None = None
         self.partner: Person | None = None
         self._erased: set[str] = set()
         self._clock = 0.0
         """s that the court has ticked."""
-        self._check()
-
-    def _check(self) -> None:
-        """Every opponent once, so that none fails, or is compiled, in a session."""
-        plan, seats = self.plan, len(self.court.seats)
-        if (seats == 1) != (not plan.opponents):
-            need = "no opponents" if seats == 1 else "opponents"
-            raise ValueError(f"opponents: {plan.scenario} needs {need}")
-        if self._wants_partner and seats != 2:
-            raise ValueError("opponents: a person can be met in a game of two seats")
+        # All that will be played once, so that nothing is compiled in a session.
         for opponent in (self._practice, *plan.opponents):
             if opponent is not None:
-                self._invite(opponent)
+                invite(self.court, opponent)
             self.court.rehearse()
 
     @property
@@ -105,16 +117,12 @@ class Study(Session):
         plan = self.plan
         return plan.practice_opponent if plan.practice and plan.opponents else None
 
-    def _invite(self, opponent: Opponent) -> None:
-        """Give all seats but the participant's to an opponent."""
-        self.court.hold_back(opponent.fairness)
-        for i in range(1, len(self.court.seats)):
-            self.court.seat(i, opponent.name)
-
     # Who is there.
 
     def _on_hello(self, guest: Guest, key: str) -> None:
         guest.key = key
+        if self.subject is None and key not in self._erased:
+            self._resume(key)
         self._seat_people()
         if self.court.reason == GONE and not self.free:
             self.court.start()
@@ -145,15 +153,60 @@ class Study(Session):
         if self._stage(guest) != "consent" or not guest.key:
             return
         role = "participant" if self.subject is None else "partner"
-        diary, now = Diary(self.folder, role, self.plan), time.monotonic()
+        diary = Diary.begin(self.folder, role, self.plan, guest.key)
+        now = time.monotonic()
         self._erased.discard(guest.key)
         if self.subject is None:
-            self.subject = Subject(guest.key, diary, now)
-            self.recorder = Recorder(diary.folder)
-            self._enter(-1 if self.plan.practice else 0)
+            self._admit(Subject(guest.key, diary, now))
+            self._enter(self._first)
         else:
             self.partner = Person(guest.key, diary, now)
         self._seat_people()
+
+    def _admit(self, subject: Subject) -> None:
+        self.subject, self.recorder = subject, Recorder(subject.diary.folder)
+
+    @property
+    def _first(self) -> int:
+        """The block with which all begins."""
+        return -1 if self.plan.practice else 0
+
+    def _resume(self, key: str) -> None:
+        """Go on with a session that was cut off, by what its diary says."""
+        if not self.folder.is_dir():
+            return
+        for diary in diaries(self.folder):
+            head = diary.rows[0]
+            known = head["page"] == digest(key) and head["plan"] == self.plan.digest
+            if head["role"] == "participant" and known and not diary.over:
+                self._admit(Subject(key, diary, time.monotonic()))
+                self._enter(self._first)
+                for row in list(diary.rows):
+                    self._replay(row)
+
+    def _replay(self, row: dict[str, Any]) -> None:
+        """Follow a line of the diary."""
+        subject = self.subject
+        assert subject is not None
+        if row["kind"] == "game" and row["result"] != BROKEN:
+            subject.game += 1
+            self._lead_on(subject)
+        elif row["kind"] == "answer":
+            subject.answers[row["question"]] = row["value"]
+            if subject.answers.keys() >= {q.id for q in self.plan.questions}:
+                self._enter(subject.block + 1)
+
+    def hear(self, guest: Guest, text: str) -> None:
+        if self.court.phase not in ("play", "countdown"):
+            self._notice_erased()
+        super().hear(guest, text)
+
+    def _notice_erased(self) -> None:
+        """People whose folder somebody has deleted are out."""
+        for person in (self.subject, self.partner):
+            if person is not None and not person.diary.there:
+                self._close(person)
+                self._erased.add(person.key)
 
     def _on_withdraw(self, guest: Guest) -> None:
         """Erase all that is kept of a person, now."""
@@ -191,9 +244,14 @@ class Study(Session):
                 person.seen = now
             if guest.seat is not None and now - guest.moved > IDLE:
                 self.court.pause("a player has been idle")
+        self._notice_erased()
         for person in (self.subject, self.partner):
-            if person is not None and now - person.seen > ABSENT:
-                person.diary.write("end", reason="left")
+            if person is None:
+                continue
+            ended = isinstance(person, Subject) and person.stage == "end"
+            if now - person.seen > (GRACE if ended else ABSENT):
+                if not ended:
+                    person.diary.write("end", reason="left")
                 self._close(person)
 
     # What the participant goes through.
@@ -205,11 +263,12 @@ class Study(Session):
         subject.block, subject.game, subject.answers = block, 0, {}
         if block == plan.blocks:
             subject.stage = "end"
-            subject.diary.write("end", reason="complete")
+            if not subject.diary.over:
+                subject.diary.write("end", reason="complete")
             return
         opponent = self._opponent
         if opponent is not None:
-            self._invite(opponent)
+            invite(self.court, opponent)
         subject.stage = "rest" if block > 0 and plan.rest > 0 else "ready"
         subject.until = self._clock + plan.rest
         self._seat_people()
@@ -222,7 +281,7 @@ class Study(Session):
             return None
         if subject.block < 0:
             return plan.practice_opponent
-        return plan.opponents[subject.diary.order[subject.block]]
+        return plan.opponents[plan.sequence(subject.diary.number)[subject.block]]
 
     def _place(self) -> dict[str, Any]:
         """Where the participant is, for recordings and the diary."""
@@ -259,6 +318,7 @@ class Study(Session):
         if subject is None:
             return
         if subject.stage == "match" and self.court.phase == "done":
+            self._notice_erased()
             self._note_game(subject)
         elif subject.stage == "over" and self._clock >= subject.until:
             self._lead_on(subject)
@@ -267,7 +327,20 @@ class Study(Session):
 
     def _note_game(self, subject: Subject) -> None:
         """A game is over; one that was broken off is played again."""
-        subject.diary.write("game", **self._place(), result=self._result)
+        if self.subject is None:
+            return
+        court, recorder = self.court, self.recorder
+        subject.diary.write(
+            "game",
+            **self._place(),
+            result=self._result,
+            score=court.world.scenario.caption(
+                {name: value[0] for name, value in court.world.memory.items()}
+            ),
+            seconds=round(court.ticks / RATE, 2),
+            pauses=court.pauses,
+            recording=recorder.path.name if recorder and recorder.path else "",
+        )
         subject.game += not self.court.reason
         subject.stage, subject.until = "over", self._clock + VERDICT
 
@@ -286,7 +359,7 @@ class Study(Session):
         """How a game ended for the participant; a task is won by its success."""
         court = self.court
         if court.reason:
-            return "broken off"
+            return BROKEN
         if SUBJECT in court.winners:
             return "won"
         contest = len({seat.team for seat in court.seats}) > 1
@@ -312,6 +385,7 @@ class Study(Session):
                 opponent=place["opponent"],
                 question=name,
                 value=answer,
+                choice=asked[name].choices[answer - 1] if asked[name].choices else "",
             )
         self._enter(subject.block + 1)
 
@@ -341,6 +415,7 @@ class Study(Session):
         name = opponent.label if opponent else ""
         if subject is not None and self.plan.blind:
             name = "Practice" if subject.block < 0 else f"Opponent {subject.block + 1}"
+            name = "" if opponent is None else name
         others = [{"who": name, "taken": True, "title": name}]
         count = len(self.court.seats)
         return {
@@ -348,7 +423,6 @@ class Study(Session):
             "seats": [{"who": PERSON, "taken": subject is not None}]
             + others * (count - 1),
             "strength": "",
-            "recording": self.subject is not None,
         }
 
     def _stage(self, guest: Guest) -> str:

@@ -22,14 +22,17 @@ const probe = (window.airhockey = { frames: [], latencies: [], state: () => now 
 const key = sessionStorage.getItem("key") || Math.random().toString(36).slice(2) + Date.now().toString(36);
 sessionStorage.setItem("key", key);
 
+const unsaid = []; // what was clicked while there was no connection
 function say(t, fields = {}) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ t, ...fields }));
+  const text = JSON.stringify({ t, ...fields });
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(text);
+  else if (["consent", "answer", "withdraw", "next"].includes(t)) unsaid.push(text);
 }
 
 function connect() {
   const scheme = location.protocol === "https:" ? "wss:" : "ws:";
   socket = new WebSocket(`${scheme}//${location.host}/ws${location.search}`);
-  socket.onopen = () => { down = false; refused = ""; say("hello", { key }); };
+  socket.onopen = () => { down = false; refused = ""; say("hello", { key }); for (const text of unsaid.splice(0)) socket.send(text); };
   socket.onmessage = (event) => {
     const data = JSON.parse(event.data);
     if (data.t === "court") { court = data; trails = []; mine = null; panel = ""; resize(); return; }
@@ -435,7 +438,7 @@ function replayWords() {
 }
 
 function notice(sits, free, say) {
-  $("stop").hidden = now.phase !== "pause" || !say;
+  $("stop").hidden = Boolean(court.study) || now.phase !== "pause" || !say;
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.left)), "", "", true);
   else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${court.what} Move the pointer to move your paddle. Space starts.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", say ? "Start" : "");
@@ -472,7 +475,7 @@ function scoreboard() {
 
 function titleOf(i) {
   const { who, title } = now.seats[i];
-  if (title && i !== now.seat) return title;
+  if (title !== undefined) return i === now.seat ? "You" : title;
   return who === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : who.replace("zoo/", "policy ").replace(":strength=", ", ");
 }
 

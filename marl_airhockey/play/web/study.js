@@ -83,6 +83,8 @@ function studyWords() {
   const { block, game, games, left, waits } = now.study, where = block < 0 ? "Practice" : `Part ${block + 1} of ${court.study.blocks}`;
   if (down) show("No connection", refused || "trying again…", "");
   else if (stage === "busy") show("A session is running", "Please wait until it is over.", "");
+  else if (stage === "partner" && now.phase !== "play" && now.phase !== "countdown" && now.phase !== "pause") show("Please wait", "You play in a part of this session. Thank you for taking part.", "");
+  else if (stage === "partner" && !sits) show("Please wait", "You play in another part of this session.", "");
   else if (stage === "rest") show("A break", `${where} begins in ${left} s.`, "");
   else if (stage === "over") show(verdict(), now.reason, "");
   else if (stage === "ready" && waits) show(where, "Waiting for the other player.", "");
