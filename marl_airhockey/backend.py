@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from marl_airhockey.cast import Cast
 from marl_airhockey.state import Array, State, still_state
+
+if TYPE_CHECKING:
+    from marl_airhockey.scenario import Mark
 
 TOLD_SPEED = 5.0
 """m/s: a told paddle that must be faster than this is lifted, without contact."""
@@ -47,6 +51,8 @@ class Backend(ABC):
     realtime: ClassVar[bool] = False
     """True if a step takes as long as it lasts."""
     default_substeps: ClassVar[int]
+    cameras: ClassVar[tuple[str, ...]] = ()
+    """Names of views that it can take pictures from."""
 
     def __init__(
         self, cast: Cast, num_worlds: int, control_dt: float, substeps: int
@@ -95,6 +101,16 @@ class Backend(ABC):
         way /= self.control_dt
         lifted = told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
         return np.where(told[..., None], way, command.velocity), told, lifted
+
+    def photograph(
+        self, world: int, camera: str, marks: Sequence[Mark], width: int
+    ) -> Array:
+        """(H, W, 3) uint8 of what one of the `cameras` sees of a world.
+
+        Raises:
+            RuntimeError: it cannot be drawn here; says what to install.
+        """
+        raise NotImplementedError
 
     def close(self) -> None:
         """Let go of whatever the backend holds."""

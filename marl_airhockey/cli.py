@@ -249,6 +249,9 @@ def watch(
     ] = None,
     option: Options = None,
     other: Drivers = None,
+    camera: Annotated[
+        str, typer.Option(help="top, or a camera of the backend: agentview...")
+    ] = "top",
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 0,
     browser: cli_play.Browser = True,
@@ -268,7 +271,8 @@ def watch(
     if not scenario:
         raise ValueError("--scenario: say what the driver is to play")
     keywords = environment(backend, profile, option, other)
-    film(scenario, make_driver(driver), keywords, seed, episodes, video)
+    player = make_driver(driver)
+    film(scenario, player, keywords, seed, episodes, video, camera=camera)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 

@@ -13,7 +13,7 @@ from PIL import Image
 from marl_airhockey.driver import Driver
 from marl_airhockey.make import Keywords
 from marl_airhockey.match import seat_world
-from marl_airhockey.render import Renderer, draw
+from marl_airhockey.render import TOP, Renderer
 from marl_airhockey.scenario import Scenario
 from marl_airhockey.state import Array
 
@@ -30,6 +30,7 @@ def film(
     video: Path | None = None,
     width: int = 640,
     seconds: float = float("inf"),
+    camera: str = TOP,
 ) -> list[Array]:
     """Play some episodes with ``driver`` at paddle_0 and show them.
 
@@ -42,6 +43,7 @@ def film(
         video: a .gif or .mp4 to write; None opens a window.
         width: of the pictures, pixels.
         seconds: at most this much of each episode.
+        camera: the view: "top", or one of the backend's cameras.
 
     Returns:
         The pictures (H, W, 3) uint8; none if they went to a window.
@@ -57,7 +59,8 @@ def film(
         raise ValueError(f"video: {video.name!r} must end in .gif or .mp4")
     world = seat_world(driver, scenario, 1, keywords)
     mode = "human" if video is None else "rgb_array"
-    renderer = Renderer(world, mode, world.scenario.name.replace("_", " "))
+    title = world.scenario.name.replace("_", " ")
+    renderer = Renderer(world, mode, title, camera=camera)
     fps = 1 / world.control_dt
     pictures: list[Array] = []
     for episode in range(episodes):
@@ -69,7 +72,7 @@ def film(
             over = bool(step.terminated[0] or step.truncated[0])
             renderer.follow()
             if video is not None:
-                pictures.append(draw(renderer.scene(), width))
+                pictures.append(renderer.picture(width))
         pictures += pictures[-1:] * round(FINAL_HOLD * fps)
     if video is not None:
         write_video(video, pictures, fps)

@@ -144,17 +144,19 @@ def make_world(
 def parallel_env(
     scenario: str | Scenario,
     render_mode: str | None = None,
+    camera: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeyEnv:
     """A PettingZoo ParallelEnv of a scenario; its open seats are the agents."""
     from marl_airhockey.parallel import AirHockeyEnv
 
-    return AirHockeyEnv(scenario, render_mode, **keywords)
+    return AirHockeyEnv(scenario, render_mode, camera, **keywords)
 
 
 def env(
     scenario: str | Scenario,
     render_mode: str | None = None,
+    camera: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AECEnv[str, Any, Any]:
     """The same as a PettingZoo AEC environment, with its usual wrappers."""
@@ -162,7 +164,7 @@ def env(
     from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
     return OrderEnforcingWrapper(
-        parallel_to_aec(parallel_env(scenario, render_mode, **keywords))
+        parallel_to_aec(parallel_env(scenario, render_mode, camera, **keywords))
     )
 
 

@@ -40,6 +40,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     Args:
         scenario: its name, or a scenario object.
         render_mode: None, "rgb_array" or "human".
+        camera: of its pictures: "top", or one of the backend's cameras.
         **keywords: see `make.build_world`.
     """
 
@@ -54,6 +55,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self,
         scenario: str | Scenario,
         render_mode: str | None = None,
+        camera: str = "top",
         **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, 1, autoreset=False, keywords=keywords)
@@ -67,7 +69,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             from marl_airhockey.render import Renderer
 
             title = game.name.replace("_", " ")
-            self._renderer = Renderer(self.world, render_mode, title)
+            self._renderer = Renderer(self.world, render_mode, title, camera=camera)
         self.possible_agents = [f"paddle_{i}" for i in self.world.open]
         self.agents: list[str] = []
         observer = self.world.observer

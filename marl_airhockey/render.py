@@ -39,6 +39,12 @@ PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
 GOAL = (200, 60, 90)
 
 
+TOP = "top"
+"""The view from above, which every backend has: drawn in 2D."""
+WIDTH = 880
+"""Pixels of a picture."""
+
+
 @dataclass(frozen=True)
 class Scene:
     """All that a picture shows of one world."""
@@ -59,7 +65,7 @@ class Scene:
     """Which seats are out of the game, if any are."""
 
 
-def draw(scene: Scene, width: int = 880) -> Array:
+def draw(scene: Scene, width: int = WIDTH) -> Array:
     """A picture (H, W, 3) uint8 RGB of a scene, ``width`` pixels wide."""
     canvas = Canvas(scene.cast.table, width, margin=0.075, bar=44)
     _table(canvas, scene)
@@ -199,6 +205,8 @@ class Renderer:
     mode: str
     title: str
     index: int = 0
+    camera: str = TOP
+    """`TOP`, or one of the backend's cameras."""
     _trails: list[list[tuple[float, float]]] = field(default_factory=list)
     _window: Any = None
 
@@ -208,6 +216,9 @@ class Renderer:
     def __post_init__(self) -> None:
         if self.mode not in self.MODES:
             raise ValueError(unknown("render_mode", self.mode, self.MODES))
+        views = (TOP, *self.world.backend.cameras)
+        if self.camera not in views:
+            raise ValueError(unknown("camera", self.camera, views))
         self.begin()
 
     def begin(self) -> None:
@@ -245,9 +256,18 @@ class Renderer:
             retired=() if retired is None else retired.tolist(),
         )
 
+    def picture(self, width: int = WIDTH) -> Array:
+        """(H, W, 3) uint8 of what there is to see now."""
+        scene = self.scene()
+        if self.camera == TOP:
+            return draw(scene, width)
+        backend = self.world.backend
+        taken: Array = backend.photograph(self.index, self.camera, scene.marks, width)
+        return taken
+
     def show(self) -> Array | None:
         """The picture; in human mode it goes to the window and None comes back."""
-        picture = draw(self.scene())
+        picture = self.picture()
         if self.mode == "rgb_array":
             return picture
         from marl_airhockey.window import Window

@@ -20,6 +20,7 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
     Args:
         scenario: its name, or a scenario object.
         render_mode: None, "rgb_array" or "human".
+        camera: of its pictures: "top", or one of the backend's cameras.
         **keywords: see `make.build_world`.
 
     Raises:
@@ -32,9 +33,10 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         self,
         scenario: str | Scenario,
         render_mode: str | None = None,
+        camera: str = "top",
         **keywords: Unpack[Keywords],
     ) -> None:
-        self.parallel = AirHockeyEnv(scenario, render_mode, **keywords)
+        self.parallel = AirHockeyEnv(scenario, render_mode, camera, **keywords)
         check_one_open(self.parallel.world)
         self.agent = self.parallel.possible_agents[0]
         self.render_mode = render_mode
@@ -100,9 +102,10 @@ def check_one_open(world: World) -> None:
 def make_single(
     scenario: str | Scenario,
     render_mode: str | None = None,
+    camera: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeySingleEnv:
     """What ``gymnasium.make`` calls."""
     dicts = keywords.get("goals") == "dict"
     kind = AirHockeyGoalEnv if dicts else AirHockeySingleEnv
-    return kind(scenario, render_mode, **keywords)
+    return kind(scenario, render_mode, camera, **keywords)

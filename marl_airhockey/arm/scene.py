@@ -21,6 +21,9 @@ THICK = 0.06
 """m, of rails"""
 TALL = 0.02
 """m, half the height of what touches sideways"""
+LOW = 0.004
+"""m, half the height of what a puck is felt with: higher up, a puck that is caught between
+paddle and rail would tip the paddle"""
 IMPEDANCE = "0.99 0.999 0.001 0.5 2"
 """solimp of contacts that return a set share of the speed"""
 
@@ -66,6 +69,7 @@ class AirHockeyArena(Arena):
             self._mover(
                 f"{kind}{number}", kind, cast.bodies.radius[k + len(cast.seats)]
             )
+        self._stands(place)
         for k, obstacle in enumerate(cast.obstacles):
             self._obstacle(k, obstacle.start, obstacle.end, obstacle.radius)
 
@@ -152,13 +156,30 @@ class AirHockeyArena(Arena):
                 name,
                 # Two capsules meet in one point, as discs in a plane do.
                 "box" if square else "capsule",
-                size=array_to_string(size),
+                pos=array_to_string([0, 0, LOW - TALL]),
+                size=array_to_string([*size[:-1], LOW]),
                 mass="0.03",
                 priority="1" if kind == "block" else "0",
                 **_sliding(SLIDES | RAIL),
             )
         )
         self.table.append(body)
+
+    def _stands(self, place: Place) -> None:
+        """Legs of the table and pedestals of the arms, to look at."""
+        x, y = self.cast.table.size / 2 - 0.08
+        for k, (i, j) in enumerate(((-x, -y), (-x, y), (x, -y), (x, y))):
+            top = place.to_world(float(i), float(j), -0.05)
+            self._stand(f"leg{k}", "box", top, "0.025 0.025")
+        for k in range(len(self.cast.seats)):
+            base, _ = place.base(self.cast, k)
+            self._stand(f"pedestal{k}", "cylinder", base, "0.09")
+
+    def _stand(self, name: str, kind: str, top: Array, size: str) -> None:
+        x, y, z = top
+        size, pos = f"{size} {z / 2}", array_to_string([x, y, z / 2])
+        rest = {"size": size, "pos": pos, "material": "rail", **_drawn()}
+        self.worldbody.append(new_geom(f"{name}_visual", kind, **rest))
 
     def _obstacle(
         self,

@@ -88,6 +88,7 @@ class Arms:
             trace,
         )
         self._ahead = np.zeros((self._seats, 2))
+        self._whole = np.array([m.width is None for m in cast.mouths], np.bool_)
         self._out = np.zeros(self._pucks, np.bool_)
 
     def start(
@@ -136,6 +137,16 @@ class Arms:
             reference(start[i], old[i], new[i], period, period, out)
             self._ahead[i] = out[0]
         return start
+
+    def retire(self) -> None:
+        """Pucks that are through a goal mouth lie still until they are served."""
+        through = (self.report.crossed & ~self._whole).any(-1)
+        for puck in np.flatnonzero(through).tolist():
+            self._out[puck] = True
+            self.surface.put_out(puck, True)
+        for puck in np.flatnonzero(self._out).tolist():
+            dof = self.surface.dofs[puck]
+            self.data.qvel[dof : dof + 3] = 0.0
 
     @property
     def events(self) -> dict[str, Array]:

@@ -5,16 +5,22 @@ from __future__ import annotations
 import copy
 import importlib.util
 import logging
+import os
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib import metadata
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from marl_airhockey.backend import Backend, Command
 from marl_airhockey.cast import Cast
+from marl_airhockey.scenario import Mark
 from marl_airhockey.state import Array, State
 from marl_airhockey.table import TABLES, make_seat
+
+if TYPE_CHECKING:
+    from marl_airhockey.arm.camera import Camera
 
 TESTED = "robosuite==1.5.2", "mujoco==3.9.0"
 
@@ -30,6 +36,7 @@ class Robosuite(Backend):
     exact: ClassVar[bool] = True
     ideal: ClassVar[bool] = False
     default_substeps: ClassVar[int] = 50
+    cameras: ClassVar[tuple[str, ...]] = ("frontview", "agentview", "birdview")
 
     @classmethod
     def available(cls) -> str | None:
@@ -63,6 +70,8 @@ class Robosuite(Backend):
         self, cast: Cast, num_worlds: int, control_dt: float, substeps: int
     ) -> None:
         super().__init__(cast, num_worlds, control_dt, substeps)
+        # Without a screen; MuJoCo reads it when it is imported.
+        os.environ.setdefault("MUJOCO_GL", "egl")
         # Robosuite warns of files that nobody needs; errors are shown.
         log = logging.getLogger("robosuite_logs")
         log.addFilter(lambda record: record.levelno >= logging.ERROR)
@@ -100,6 +109,7 @@ class Robosuite(Backend):
         ]
         self._old = np.zeros((num_worlds, len(cast.seats), 2))
         self.state = self.quiet
+        self._cameras: dict[tuple[int, int], Camera] = {}
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         for i in worlds.tolist():
@@ -141,6 +151,7 @@ class Robosuite(Backend):
                 self._dt,
                 self.substeps,
             )
+            world.retire()
             world.read(arrays, i)
             path[i] = world.report.path
             for name, value in world.events.items():
@@ -155,7 +166,20 @@ class Robosuite(Backend):
         )
         return self.state
 
+    def photograph(
+        self, world: int, camera: str, marks: Sequence[Mark], width: int
+    ) -> Array:
+        from marl_airhockey.arm.camera import Camera
+
+        arms, key = self.worlds[world], (world, width)
+        if key not in self._cameras:
+            height = round(width * 0.6)
+            self._cameras[key] = Camera(arms.model, self.env.place, width, height)
+        return self._cameras[key].picture(arms.data, camera, marks)
+
     def close(self) -> None:
+        for camera in self._cameras.values():
+            camera.close()
         self.env.close()
 
 

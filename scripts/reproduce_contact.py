@@ -1,0 +1,117 @@
+"""Does the arm keep its paddle on the table? Statistics over every physics step.
+
+    python scripts/reproduce_contact.py --steps 2000 --seeds 5
+
+Random actions, full-speed runs in random directions, the zoo's juggling policy, and the
+zoo's duel between two arms, each for some seeds and control steps in the robot profile's
+spread of physics. Height and tilt are extremes, the force is a mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+import marl_airhockey as ah
+from marl_airhockey.limits import Reach
+from marl_airhockey.state import Array
+from marl_airhockey.world import World
+
+LIMIT = 0.9 * np.pi
+"""rad/s, of a joint"""
+Rule = Callable[[int, World], Array]
+
+
+def unsteady(seed: int) -> Rule:
+    """Another action at every step."""
+    rng = np.random.default_rng(seed)
+    return lambda k, world: rng.uniform(-1, 1, (world.num_worlds, len(world.open), 2))
+
+
+def sweeping(seed: int) -> Rule:
+    """Full speed one way for 0.6 s, then another."""
+    rng = np.random.default_rng(seed)
+    held: dict[str, Array] = {}
+
+    def ask(k: int, world: World) -> Array:
+        if k % 12 == 0:
+            angle = rng.uniform(0, 2 * np.pi, (world.num_worlds, len(world.open)))
+            held["now"] = np.stack([np.cos(angle), np.sin(angle)], -1)
+        return held["now"]
+
+    return ask
+
+
+def nobody(seed: int) -> Rule:
+    """Drivers play."""
+    return lambda k, world: np.zeros((world.num_worlds, len(world.open), 2))
+
+
+CASES: tuple[tuple[str, str, dict[str, Any], Callable[[int], Rule]], ...] = (
+    ("random", "juggle", {}, unsteady),
+    ("full speed", "juggle", {}, sweeping),
+    ("zoo/juggle", "juggle", {"drivers": {"paddle_0": "zoo/juggle"}}, nobody),
+    (
+        "zoo/duel_robot, two arms",
+        "duel",
+        {
+            "drivers": {f"paddle_{i}": "zoo/duel_robot" for i in (0, 1)},
+            "options": {"seats": "robot"},
+        },
+        nobody,
+    ),
+)
+
+
+def main(
+    steps: Annotated[int, typer.Option(help="Control steps of each seed.")] = 2000,
+    seeds: Annotated[int, typer.Option(help="How many.")] = 5,
+    profile: Annotated[str, typer.Option(help="ideal or robot.")] = "robot",
+) -> None:
+    """Measure and print."""
+    table = Table(title=f"{seeds} seeds of {steps} control steps, {profile} profile")
+    for name in (
+        "case",
+        "lowest mm",
+        "highest mm",
+        "tilt deg",
+        "force N",
+        "joint rad/s",
+    ):
+        table.add_column(name)
+    table.add_column("beyond the reach mm")
+    for name, scenario, keywords, rule in CASES:
+        world = ah.make_world(
+            scenario, seeds, backend="robosuite", profile=profile, **keywords
+        )
+        world.reset(0)
+        reach = Reach.of(world.cast.table, world.cast.seats)
+        ask, trace, beyond = rule(0), [], 0.0
+        for k in range(steps):
+            world.step(ask(k, world))
+            rows: Array = world.backend.trace  # type: ignore[attr-defined]
+            trace.append([rows[..., 0].min(), rows[..., 0].max()])
+            trace[-1] += [rows[..., 1].max(), rows[..., 2].mean(), rows[..., 3].max()]
+            room = np.einsum("skd,bsd->bsk", reach.normals, world.state.paddle)
+            beyond = max(beyond, float(-(room + reach.offsets).min()))
+        found = np.array(trace)
+        table.add_row(
+            name,
+            f"{1000 * found[:, 0].min():.2f}",
+            f"{1000 * found[:, 1].max():.2f}",
+            f"{np.degrees(found[:, 2].max()):.2f}",
+            f"{found[:, 3].mean():.1f}",
+            f"{found[:, 4].max():.2f} ({found[:, 4].max() / LIMIT:.0%})",
+            f"{1000 * beyond:.1f}",
+        )
+        world.close()
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)
