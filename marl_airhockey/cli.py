@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey import cli_games, cli_play, cli_study
+from marl_airhockey import cli_games, cli_play, cli_study, cli_transfer
 from marl_airhockey.catalogue import describe, summary
 from marl_airhockey.cli_common import (
     AsJson,
@@ -36,6 +36,7 @@ from marl_airhockey.registry import make_driver
 FLOORS = ("still", "random", "sticky")
 app.command()(cli_games.league)
 app.command()(cli_play.play)
+app.command()(cli_transfer.transfer)
 record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
 record.command()(cli_play.report)
 app.add_typer(record, name="record")
@@ -90,6 +91,9 @@ def train(
     num_env_runners: Annotated[
         int | None, typer.Option(help="Of rllib: processes that step the worlds.")
     ] = None,
+    init: Annotated[
+        Path | None, typer.Option(help="Begin with the weights of this run.")
+    ] = None,
     change: Annotated[
         list[str] | None,
         typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
@@ -115,6 +119,8 @@ def train(
             changes["total_steps"] = steps
         if hidden is not None:
             changes["hidden"] = [hidden, hidden]
+        if init is not None:
+            changes["init"] = str(init)
         if engine is not None:
             changes["engine"] = engine
         if num_env_runners is not None:

@@ -2,8 +2,8 @@
 
     python scripts/reproduce_contact.py --steps 2000 --seeds 5
 
-Random actions, full-speed runs in random directions, the zoo's juggling policy, and the
-zoo's duel between two arms, each for some seeds and control steps in the robot profile's
+Random actions, full-speed runs in random directions, the zoo's juggling policy, and
+the zoo's duel between two arms, for some seeds and control steps in the robot profile's
 spread of physics. Height and tilt are extremes, the force is a mean.
 """
 

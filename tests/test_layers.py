@@ -54,6 +54,8 @@ LAYERS = (
         "cli_play",
         "play",
         "cli_study",
+        "cli_transfer",
+        "transfer",
         "study",
     },
 )

@@ -22,7 +22,7 @@ THICK = 0.06
 TALL = 0.02
 """m, half the height of what touches sideways"""
 LOW = 0.004
-"""m, half the height of what a puck is felt with: higher up, a puck that is caught between
+"""m, half the height of what a puck is felt with: higher up, one that is caught between
 paddle and rail would tip the paddle"""
 IMPEDANCE = "0.99 0.999 0.001 0.5 2"
 """solimp of contacts that return a set share of the speed"""

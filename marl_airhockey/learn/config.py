@@ -56,6 +56,10 @@ class TrainConfig:
     num_env_runners: int = 0
     """Of rllib: processes that step the worlds; 0 for none besides the learner's."""
 
+    init: str = ""
+    """Of sb3: the folder of a run of the same size, whose weights training begins with.
+    Its card must say the same observation."""
+
     total_steps: int
     """Steps of single worlds, over all of them."""
     num_worlds: int

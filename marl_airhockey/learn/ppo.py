@@ -33,6 +33,8 @@ def learn(ledger: Ledger) -> Grades:
         model.learning_rate = model.lr_schedule = rate
     else:
         model = build(config, env, rate)
+        if config.init:
+            _take_weights(model, Path(config.init), config.log_std_init)
     # Other worlds than those before the cut.
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(_logger(folder, progress.steps))
@@ -51,6 +53,24 @@ def _logger(folder: Path, steps: int) -> Logger:
     name = f"progress-{steps}.csv" if steps else "progress.csv"
     table = CSVOutputFormat(str(folder / name))
     return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
+
+
+def _take_weights(model: PPO, run: Path, log_std: float) -> None:
+    """Begin with the weights of a run, and with fresh exploration.
+
+    Raises:
+        ValueError: no run, or one of another size.
+    """
+    kept = [run / f"{name}.zip" for name in ("best", "last")]
+    path = next((file for file in kept if file.exists()), None)
+    if path is None:
+        raise ValueError(f"init: {run} is no folder of a run of sb3")
+    weights = PPO.load(path, device="cpu").policy.state_dict()
+    weights["log_std"] = torch.full_like(weights["log_std"], log_std)
+    try:
+        model.policy.load_state_dict(weights)
+    except RuntimeError as error:
+        raise ValueError(f"init: {run} has another size: {error}") from error
 
 
 def build(config: TrainConfig, env: AirHockeyVecEnv, rate: Rate) -> PPO:
