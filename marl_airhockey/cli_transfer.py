@@ -85,19 +85,16 @@ def transfer(
     if as_json:
         console.print_json(data)
         return
-    table = Table("policy", title=f"{scenario}: success of {episodes} episodes (95 %)")
-    columns = [(b, p) for p in profiles for b in backends]
-    for backend, kind in columns:
-        table.add_column(f"{backend}\n{kind}", justify="right")
+    table = Table("policy", "in", title=f"{scenario}: success in {episodes} episodes")
+    for kind in profiles:
+        table.add_column(f"{kind} profile (95 %)", justify="right")
     for name in policies:
-        cells = {(r.backend, r.profile): r for r in rows if r.policy == name}
-        shown = [cells[column] for column in columns]
-        table.add_row(
-            name,
-            *(
-                f"{r.success:.3f}\n{r.interval[0]:.2f}..{r.interval[1]:.2f}"
-                for r in shown
-            ),
-        )
+        for backend in backends:
+            mine = [r for r in rows if (r.policy, r.backend) == (name, backend)]
+            cells = [
+                f"{r.success:.3f} ({r.interval[0]:.2f}..{r.interval[1]:.2f})"
+                for r in mine
+            ]
+            table.add_row(name, backend, *cells)
     console.print(table)
     console.print("files:", folder / "transfer.json", folder / "transfer.png")

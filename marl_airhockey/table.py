@@ -141,7 +141,7 @@ def make_seat(
 ) -> Seat:
     """A seat of a kind at a side of a table.
 
-    ``robot``: what a UR5e can hold with its base 0.25 m behind the low edge, a box of
+    ``robot``: what a UR5e can hold with its base 0.22 m behind its edge, a box of
     0.42 x 0.50 m that begins 78 mm from the edge, with far corners cut at the slope of
     0.8 that the paper's authors use, as far as it lies in the side's territory.
     ``arcade``: all of the territory. Centres keep a paddle's radius inside of it.

@@ -122,7 +122,11 @@ def picture(rows: Sequence[Transfer], path: Path) -> None:
             axes.hlines(at, *zip(*(r.interval for r in mine), strict=True), color=ink)
             axes.plot([r.success for r in mine], at, "o", color=ink, label=backend)
         axes.set_yticks(range(len(policies)), policies)
-        axes.set(xlim=(-0.03, 1.03), xlabel=f"success, {profile} profile (95 %)")
+        axes.set(
+            xlim=(-0.03, 1.03),
+            ylim=(-0.6, len(policies) - 0.4),
+            xlabel=f"success, {profile} profile (95 %)",
+        )
         tidy(axes, legend=None)
     grid[0, 0].legend(frameon=False, loc="best")
     save(figure, path)

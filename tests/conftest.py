@@ -9,6 +9,7 @@ import pytest
 import marl_airhockey as ah
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+os.environ.setdefault("MUJOCO_GL", "egl")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
 

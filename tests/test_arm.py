@@ -9,7 +9,7 @@ from marl_airhockey.cast import Cast, Mouth
 from marl_airhockey.physics import PARAMETERS
 from marl_airhockey.registry import find_backend
 from marl_airhockey.starts import first_state
-from marl_airhockey.table import GRAVITY, TABLES, make_seat
+from marl_airhockey.table import GRAVITY, TABLES, half_planes, make_seat
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("robosuite")
@@ -158,6 +158,35 @@ def test_nothing_escapes():
             assert y < 0.3048
 
 
+@pytest.mark.parametrize("tilt", [0.0, 5.5])
+def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
+    from marl_airhockey.arm.pose import reach_for
+    from marl_airhockey.arm.robot import AirHockey
+
+    seats = (HOME, make_seat("robot", TABLE, 2))
+    env = AirHockey(cast=Cast(TABLE, seats, physics={"tilt": tilt}))
+    env.reset()
+    model, data = env.sim.model._model, env.sim.data._data
+    for i, seat in enumerate(seats):
+        robot = env.robots[i]
+        site = robot.eef_site_id["right"]
+        places, dofs = robot._ref_joint_pos_indexes, robot._ref_joint_vel_indexes
+        angles, jacobian = np.array(robot.init_qpos), np.zeros((6, model.nv))
+        normals, offsets = half_planes(seat.reach)
+        corners = np.array(seat.reach)
+        for x, y in np.ndindex(9, 9):
+            share = np.array([x, y]) / 8
+            ego = corners.min(0) + share * np.ptp(corners, axis=0)
+            if (normals @ ego + offsets < -1e-9).any():
+                continue
+            at = env.place.to_world(*(TABLE.rotation(seat.side).T @ ego))
+            grip = env.hands[i].grip
+            angles = reach_for(model, data, site, places, dofs, at, grip, angles)
+            mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
+            plane = np.linalg.inv(jacobian[:, dofs])[:, :3] @ env.place.rotation[:, :2]
+            assert seat.speed * np.linalg.norm(plane, axis=1).max() < FASTEST
+
+
 def test_robosuites_own_steps_are_the_same():
     rng, bench = np.random.default_rng(3), Bench(pucks=1)
     env = bench.backend.env
@@ -208,6 +237,22 @@ def test_a_row_does_not_depend_on_the_others():
         return world.state.position[0]
 
     np.testing.assert_array_equal(run(1), run(3))
+
+
+def test_it_is_seen_from_three_cameras():
+    env = ah.parallel_env("hit_goal", "rgb_array", "agentview", backend="robosuite")
+    env.reset(seed=0)
+    try:
+        picture = env.render()
+    except RuntimeError as error:
+        pytest.skip(str(error))
+    assert picture.shape == (528, 880, 3)
+    assert picture.std() > 20
+    env.close()
+    with pytest.raises(ValueError, match=r"unknown camera 'agentview'.*top"):
+        ah.parallel_env("hit_goal", "rgb_array", "agentview")
+    with pytest.raises(ValueError, match=r"unknown camera 'sky'.*birdview"):
+        ah.parallel_env("hit_goal", "rgb_array", "sky", backend="robosuite")
 
 
 def test_what_an_arm_cannot_do_is_refused():

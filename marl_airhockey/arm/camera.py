@@ -34,8 +34,9 @@ class Camera:
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:
             raise RuntimeError(
-                "no picture without OpenGL: apt-get install libegl1 libegl-mesa0, or "
-                f"libosmesa6 and MUJOCO_GL=osmesa ({error})"
+                "no picture without OpenGL: apt-get install libegl1 libegl-mesa0 and "
+                "set MUJOCO_GL=egl before mujoco is imported, or libosmesa6 and "
+                f"set osmesa ({error})"
             ) from error
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0

@@ -1,0 +1,52 @@
+"""Policies elsewhere than where they were trained."""
+
+import json
+
+import pytest
+
+from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.train import train
+from marl_airhockey.registry import make_driver
+from marl_airhockey.transfer import measure, picture, tuned
+
+SMALL = {
+    "total_steps": 2048,
+    "num_worlds": 32,
+    "n_steps": 32,
+    "batch_size": 512,
+    "evaluations": 1,
+    "eval_episodes": 20,
+}
+
+
+def test_success_is_measured_in_all_physics(tmp_path):
+    pytest.importorskip("robosuite")
+    backends = ["batched", "pymunk", "robosuite"]
+    policies = {"zoo": make_driver("zoo/reach"), "nothing": make_driver("still")}
+    rows = measure(policies, "reach", backends, ["ideal"], episodes=20)
+    assert [row.backend for row in rows] == backends * 2
+    assert min(row.success for row in rows[:3]) > 0.8
+    assert max(row.success for row in rows[3:]) == 0.0
+    assert json.dumps(rows[0].to_json())
+    picture(rows, tmp_path / "transfer.png")
+    assert (tmp_path / "transfer.png").stat().st_size > 1000
+
+
+def test_training_begins_with_the_weights_of_a_run(tmp_path):
+    first = preset("reach", {**SMALL, "total_steps": 65_536})
+    learned = train(first, tmp_path / "first")["success"]
+    config = preset("reach", {**SMALL, "init": str(tmp_path / "first"), "seed": 1})
+    again = train(config, tmp_path / "second")["success"]
+    assert again >= learned - 0.3
+    assert again > train(preset("reach", SMALL), tmp_path / "fresh")["success"]
+    elsewhere = tuned(tmp_path / "first", 4096)
+    assert (elsewhere.backend, elsewhere.init) == ("robosuite", str(tmp_path / "first"))
+    assert elsewhere.observe == first.observe
+    wrong = preset(
+        "reach", {**SMALL, "init": str(tmp_path / "first"), "hidden": [8, 8]}
+    )
+    with pytest.raises(ValueError, match="another size"):
+        train(wrong, tmp_path / "wrong")
+    lost = preset("reach", {**SMALL, "init": str(tmp_path / "nowhere")})
+    with pytest.raises(ValueError, match="no folder of a run"):
+        train(lost, tmp_path / "lost")
