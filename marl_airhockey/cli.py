@@ -19,6 +19,7 @@ from marl_airhockey.cli_common import (
     Backend,
     Drivers,
     Options,
+    Physics,
     Profile,
     Scenario,
     app,
@@ -31,12 +32,14 @@ from marl_airhockey.cli_common import (
 from marl_airhockey.extras import need
 from marl_airhockey.learn.policy import Policy
 from marl_airhockey.match import TEST_SEED, Result, evaluate
+from marl_airhockey.physics import load_physics
 from marl_airhockey.registry import make_driver
 
 FLOORS = ("still", "random", "sticky")
 app.command()(cli_games.league)
 app.command()(cli_play.play)
 app.command()(cli_transfer.transfer)
+app.command()(cli_transfer.fit)
 record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
 record.command()(cli_play.report)
 app.add_typer(record, name="record")
@@ -100,6 +103,7 @@ def train(
     ] = None,
     option: Options = None,
     other: Drivers = None,
+    physics: Physics = None,
     resume: Annotated[Path | None, typer.Option(help="Go on with this run.")] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -115,6 +119,8 @@ def train(
             "options": settings(option),
             "drivers": settings(other),
         }
+        if physics is not None:
+            changes["physics"] = load_physics(physics)
         if steps is not None:
             changes["total_steps"] = steps
         if hidden is not None:
@@ -175,11 +181,12 @@ def evaluate_driver(
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,
     option: Options = None,
     other: Drivers = None,
+    physics: Physics = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     as_json: AsJson = False,
 ) -> None:
     """Measure a driver over episodes that training never sees."""
-    keywords = environment(backend, profile, option, other)
+    keywords = environment(backend, profile, option, other, physics)
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     seated = make_driver(driver)

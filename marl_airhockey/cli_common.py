@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from marl_airhockey.make import Keywords
+from marl_airhockey.physics import load_physics
 
 app = typer.Typer(
     help="Air hockey for robot learning and multi-agent RL.",
@@ -25,6 +27,9 @@ Profile = Annotated[str, typer.Option(help="ideal, or robot: delays and noise.")
 Options = Annotated[
     list[str] | None,
     typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
+]
+Physics = Annotated[
+    Path | None, typer.Option(help="A preset of physics, TOML; see airhockey fit.")
 ]
 Drivers = Annotated[
     list[str] | None,
@@ -51,7 +56,11 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
 
 
 def environment(
-    backend: str, profile: str, option: list[str] | None, driver: list[str] | None
+    backend: str,
+    profile: str,
+    option: list[str] | None,
+    driver: list[str] | None,
+    physics: Path | None = None,
 ) -> Keywords:
     """Keywords of an environment from the options that commands share."""
     return {
@@ -59,6 +68,7 @@ def environment(
         "profile": profile,
         "options": settings(option),
         "drivers": settings(driver),
+        "physics": load_physics(physics) if physics is not None else {},
     }
 
 

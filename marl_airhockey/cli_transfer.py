@@ -1,4 +1,4 @@
-"""The command ``airhockey transfer``."""
+"""The commands ``airhockey transfer | fit``."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli_common import AsJson, Options, bar, console, settings
+from marl_airhockey.cli_common import AsJson, Options, Physics, bar, console, settings
 from marl_airhockey.extras import need
+from marl_airhockey.make import Keywords
+from marl_airhockey.physics import PARAMETERS, load_physics
 from marl_airhockey.registry import make_driver
 
 
@@ -98,3 +100,47 @@ def transfer(
             table.add_row(name, backend, *cells)
     console.print(table)
     console.print("files:", folder / "transfer.json", folder / "transfer.png")
+
+
+def fit(
+    scenario: Annotated[
+        str, typer.Argument(help="What is played; without blocks.")
+    ] = "juggle",
+    driver: Annotated[
+        str | None, typer.Option(help="Who plays it; of the zoo unless given.")
+    ] = None,
+    backend: Annotated[str, typer.Option(help="Where it is played.")] = "robosuite",
+    physics: Physics = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder of recordings of play, instead of playing."),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Control steps of play.", min=1)] = 3000,
+    seed: Annotated[int, typer.Option(help="Of the play.")] = 0,
+    out: Annotated[Path, typer.Option(help="The preset.")] = Path("fit.toml"),
+) -> None:
+    """Fit the 2D table's physics to play on another one, for --physics FILE."""
+    from marl_airhockey.fit import fit as find
+    from marl_airhockey.fit import play, recorded
+
+    if recordings is not None:
+        seen = recorded(sorted(recordings.glob("*.jsonl")))
+    else:
+        who = make_driver(driver or f"zoo/{scenario}")
+        there = load_physics(physics) if physics else {}
+        with console.status(f"playing {steps} steps on {backend}"):
+            keywords: Keywords = {"backend": backend, "physics": there}
+            seen = play(scenario, who, steps, seed, keywords)
+    with console.status("fitting"):
+        found = find(seen)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(found.to_toml())
+    table = Table("", "usual values", "fitted", title=f"{found.stretches} stretches")
+    for name, value in found.physics.items():
+        usual = seen.cast.defaults.get(name, PARAMETERS[name].default)
+        table.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
+    for k, name in enumerate(("pucks off, mm", "paddles off, mm")):
+        shown = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
+        table.add_row(name, *shown)
+    console.print(table)
+    console.print(f"{found.closed:.0%} of the pucks' error is gone; wrote {out}")

@@ -6,8 +6,11 @@ A parameter is a number, or a range ``(low, high)`` drawn anew for every episode
 from __future__ import annotations
 
 import difflib
+import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -130,6 +133,18 @@ def _checked(name: str, value: Value) -> tuple[float, float]:
             f"{parameter.low} .. {parameter.high} or its ends are swapped"
         )
     return low, high
+
+
+def load_physics(path: Path) -> dict[str, Any]:
+    """A preset for ``physics=``: parameters by name, numbers or pairs, in TOML.
+
+    Raises:
+        ValueError: no such file.
+    """
+    try:
+        return tomllib.loads(path.read_text())
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path}: no preset of physics: {error}") from error
 
 
 def unknown(what: str, name: object, known: Iterable[object]) -> str:

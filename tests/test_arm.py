@@ -85,7 +85,7 @@ def test_the_paddle_stays_on_the_table(rule):
     trace, positions = drive(world, rule(np.random.default_rng(1)), 200)
     assert np.abs(trace[..., HEIGHT]).max() < 1e-3
     assert np.degrees(trace[..., TILT].max()) < 1.0
-    assert trace[..., FORCE].mean() == pytest.approx(20.0, rel=0.2)
+    assert trace[..., FORCE].mean() == pytest.approx(40.0, rel=0.2)
     assert trace[..., JOINT].max() < FASTEST
     assert trace[..., SPEED].max() < 0.7 + 0.05
     corners = np.array(HOME.reach)

@@ -56,6 +56,7 @@ LAYERS = (
         "cli_study",
         "cli_transfer",
         "transfer",
+        "fit",
         "study",
     },
 )

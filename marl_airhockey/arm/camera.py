@@ -34,7 +34,7 @@ class Camera:
             self._renderer = mujoco.Renderer(model, height, width)
         except Exception as error:
             raise RuntimeError(
-                "no picture without OpenGL: apt-get install libegl1 libegl-mesa0 and "
+                "no picture without OpenGL: apt-get install libegl1 libegl-mesa0, "
                 "set MUJOCO_GL=egl before mujoco is imported, or libosmesa6 and "
                 f"set osmesa ({error})"
             ) from error

@@ -27,14 +27,15 @@ class Gains:
     """1/s2, toward the table, of a paddle that has left it"""
     lift_ratio: float = 3.0
     """Damping ratio along the normal"""
-    turn: float = 400.0
+    turn: float = 1600.0
     """1/s2, of the orientation"""
     turn_ratio: float = 1.0
     """Damping ratio of the orientation"""
-    correction: float = 10.0
+    correction: float = 5.0
     """m/s2, largest acceleration beside that of the reference"""
-    force: float = 20.0
-    """N, on the table"""
+    force: float = 40.0
+    """N, on the table. With 20 N, and a fourth of the stiffness in turning, a puck that
+    is jammed in a corner could tip the paddle by 4 degrees."""
 
     @property
     def array(self) -> Array:

@@ -51,6 +51,8 @@ class TrainConfig:
     """The scenario's own fields."""
     drivers: dict[str, str] = field(default_factory=dict)
     """Drivers of seats that are not learned, by agent."""
+    physics: dict[str, Any] = field(default_factory=dict)
+    """Parameters by name, numbers or ranges."""
     engine: str = "sb3"
     """"sb3" in this process, or "rllib" over many."""
     num_env_runners: int = 0
@@ -170,6 +172,7 @@ class TrainConfig:
             "observe": self.observe,
             "options": self.options,
             "drivers": self.drivers,
+            "physics": self.physics,
         }
 
     def to_toml(self) -> str:

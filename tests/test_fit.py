@@ -1,0 +1,65 @@
+"""Physics found from play: those with which it was played."""
+
+import numpy as np
+import pytest
+
+from marl_airhockey.fit import FITTED, fit, play, recorded
+from marl_airhockey.physics import load_physics
+from marl_airhockey.play.court import RATE, Court
+from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.session import Session
+from marl_airhockey.registry import make_driver
+
+pytest.importorskip("scipy")
+OTHER = {
+    "tilt": 4.8,
+    "puck_damping": 0.4,
+    "wall_restitution": 0.75,
+    "paddle_restitution": 0.7,
+}
+
+
+def test_the_physics_of_another_table_are_found(tmp_path):
+    table = {"backend": "pymunk", "physics": OTHER}
+    seen = play("juggle", make_driver("zoo/juggle"), 1500, 0, table)
+    found = fit(seen)
+    for name in FITTED:
+        assert found.physics[name] == pytest.approx(OTHER[name], rel=0.12), name
+    assert found.physics["action_delay"] < 0.003
+    assert found.closed > 0.8
+    path = tmp_path / "fit.toml"
+    path.write_text(found.to_toml())
+    assert load_physics(path) == pytest.approx(found.physics, rel=1e-4)
+    path.write_text("tilt =")
+    with pytest.raises(ValueError, match="no preset of physics"):
+        load_physics(path)
+
+
+def test_an_arm_is_nearer_to_the_fitted_table():
+    pytest.importorskip("robosuite")
+    there = {"backend": "robosuite", "physics": OTHER}
+    seen = play("juggle", make_driver("zoo/juggle"), 1000, 0, there)
+    found = fit(seen)
+    assert found.physics["tilt"] == pytest.approx(4.8, abs=0.2)
+    assert found.closed > 0.5
+
+
+def test_recordings_are_fitted_to(tmp_path):
+    seats = {"paddle_0": "striker"}
+    court = Court("juggle", seats, {"physics": OTHER}, seed=0)
+    session = Session(court, Recorder(tmp_path))
+    for _ in range(6):
+        court.start()
+        while court.phase != "done":
+            session.tick()
+        session.tick()
+    seen = recorded(sorted(tmp_path.glob("*.jsonl")))
+    assert seen.control_dt == pytest.approx(1 / RATE)
+    assert not seen.follows[0]
+    assert np.isfinite(seen.position).all()
+    with pytest.raises(ValueError, match="one scenario are needed"):
+        recorded([])
+    found = fit(seen)
+    assert found.physics["tilt"] == pytest.approx(4.8, abs=0.1)
+    with pytest.raises(ValueError, match="too few"):
+        fit(play("juggle", make_driver("striker"), 100, 0, {}))
