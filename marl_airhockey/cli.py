@@ -281,6 +281,8 @@ def watch(
         else:
             watch_recording(Path(driver), video)
         return
+    if any(Path(driver).glob("*.jsonl")):
+        raise ValueError(f"{driver}: holds recordings; name one of its .jsonl files")
     if not scenario:
         raise ValueError("--scenario: say what the driver is to play")
     keywords = environment(backend, profile, option, other)

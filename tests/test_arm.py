@@ -255,6 +255,17 @@ def test_it_is_seen_from_three_cameras():
         ah.parallel_env("hit_goal", "rgb_array", "sky", backend="robosuite")
 
 
+def test_what_is_missing_is_named_with_its_fix(monkeypatch):
+    backend = find_backend("robosuite")
+    monkeypatch.setattr("importlib.metadata.version", lambda name: "3.10.0")
+    assert "pip install mujoco==3.9.0" in backend.available()
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(
+        RuntimeError, match=r"pip install 'marl_airhockey\[robosuite\]'"
+    ):
+        ah.make_world("juggle", backend="robosuite")
+
+
 def test_what_an_arm_cannot_do_is_refused():
     for game, options, words in (
         ("duel", {}, "seats='robot'"),
