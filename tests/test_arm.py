@@ -147,13 +147,13 @@ def test_drag_and_friction_are_those_of_the_other_backends():
 
 
 def test_nothing_escapes():
-    rng, bench = np.random.default_rng(0), Bench(pucks=1)
-    for _ in range(25):
+    rng, bench = np.random.default_rng(0), Bench(pucks=1, path=True)
+    for _ in range(200):
         angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.2, 0.2, 2)
         way = 5 * np.cos(angle), 5 * np.sin(angle)
         bench.start((-0.6, 0.0), (*at, *way))
         for state in bench.run(0.5):
-            x, y = np.abs(state.puck[0, 0])
+            x, y = np.abs(state.path[0, :, 1, :2]).max(0)
             assert x < 0.8382
             assert y < 0.3048
 
