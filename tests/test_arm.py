@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+from pages import aim, line
 
 import marl_airhockey as ah
 from marl_airhockey.backend import Command
 from marl_airhockey.cast import Cast, Mouth
 from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.play.court import RATE, Court
+from marl_airhockey.play.session import Session
 from marl_airhockey.registry import find_backend
 from marl_airhockey.starts import first_state
 from marl_airhockey.table import GRAVITY, TABLES, half_planes, make_seat
@@ -253,6 +256,19 @@ def test_it_is_seen_from_three_cameras():
         ah.parallel_env("hit_goal", "rgb_array", "agentview")
     with pytest.raises(ValueError, match=r"unknown camera 'sky'.*birdview"):
         ah.parallel_env("hit_goal", "rgb_array", "sky", backend="robosuite")
+
+
+def test_a_person_moves_an_arm():
+    court = Court("juggle", {}, {"backend": "robosuite"}, seed=0)
+    session = Session(court)
+    guest = session.join()
+    session.hear(guest, line("hello", key="k"))
+    session.hear(guest, aim(-0.5, 0.15))
+    session.hear(guest, line("start"))
+    for _ in range(5 * RATE):
+        session.tick()
+    np.testing.assert_allclose(court.world.state.paddle[0, 0], (-0.5, 0.15), atol=0.01)
+    court.close()
 
 
 def test_what_is_missing_is_named_with_its_fix(monkeypatch):

@@ -18,6 +18,7 @@ from marl_airhockey.make import Keywords, build_world
 from marl_airhockey.registry import (
     ZOO,
     agent_names,
+    find_backend,
     make_agent,
     make_driver,
     make_scenario,
@@ -90,7 +91,9 @@ class Court:
         fairness: Fairness | None = None,
         seed: int | None = None,
     ) -> None:
-        usual: Keywords = {"control_dt": 1 / RATE, "substeps": 4}
+        backend = find_backend(keywords.get("backend", "pymunk"))
+        substeps = 4 if backend.ideal else 16
+        usual: Keywords = {"control_dt": 1 / RATE, "substeps": substeps}
         self.keywords: Keywords = {**usual, **keywords}
         self.world = build_world(scenario, 1, autoreset=False, keywords=self.keywords)
         self.cast = self.world.cast
