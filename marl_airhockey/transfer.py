@@ -18,9 +18,8 @@ TUNING: dict[str, Any] = {
     "num_worlds": 32,
     "n_steps": 64,
     "batch_size": 512,
-    "learning_rate": 1e-4,
-    "highest_rate": 3e-4,
-    "log_std_init": -1.0,
+    "learning_rate": 5e-5,
+    "highest_rate": 1e-4,
     "evaluations": 5,
     "eval_episodes": 50,
 }

@@ -34,7 +34,7 @@ def learn(ledger: Ledger) -> Grades:
     else:
         model = build(config, env, rate)
         if config.init:
-            _take_weights(model, Path(config.init), config.log_std_init)
+            _take_weights(model, Path(config.init))
     # Other worlds than those before the cut.
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(_logger(folder, progress.steps))
@@ -55,8 +55,8 @@ def _logger(folder: Path, steps: int) -> Logger:
     return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
 
 
-def _take_weights(model: PPO, run: Path, log_std: float) -> None:
-    """Begin with the weights of a run, and with fresh exploration.
+def _take_weights(model: PPO, run: Path) -> None:
+    """Begin with the weights of a run, its exploration among them.
 
     Raises:
         ValueError: no run, or one of another size.
@@ -66,7 +66,6 @@ def _take_weights(model: PPO, run: Path, log_std: float) -> None:
     if path is None:
         raise ValueError(f"init: {run} is no folder of a run of sb3")
     weights = PPO.load(path, device="cpu").policy.state_dict()
-    weights["log_std"] = torch.full_like(weights["log_std"], log_std)
     try:
         model.policy.load_state_dict(weights)
     except RuntimeError as error:
