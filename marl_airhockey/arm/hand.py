@@ -41,7 +41,7 @@ class Hand:
         self.seat, self.place, self.period = cast.seats[seat], place, period
         self.gains = (gains or Gains()).array
         self.grip = place.grip(cast, seat)
-        normal, offset = cast.table.normals[self.seat.side], 0.0
+        normal = cast.table.normals[self.seat.side]
         offset = float(cast.table.offsets[self.seat.side]) - HOME
         self.home = (float(-normal[0] * offset), float(-normal[1] * offset))
         """Where a paddle waits, table frame, m."""
@@ -57,7 +57,7 @@ class Hand:
         self._model, self._data, self._site = model, data, site
         self._dofs = np.asarray(dofs)
         self._body = int(model.site_bodyid[site])
-        self._low, self._high = np.array(low, float), np.array(high, float)
+        self.low, self.high = np.array(low, float), np.array(high, float)
         self._jacobian, self._drift = np.zeros((2, 6, model.nv))
         self._mass = np.zeros((model.nv, model.nv))
 
@@ -124,8 +124,8 @@ class Hand:
             self.grip,
             wanted,
             self.gains,
-            self._low,
-            self._high,
+            self.low,
+            self.high,
             out,
         )
         self._steps += 1

@@ -91,8 +91,8 @@ class Robosuite(Backend):
             rotation=place.rotation,
             grips=np.array([hand.grip for hand in env.hands]),
             gains=env.hands[0].gains,
-            low=np.array([hand._low for hand in env.hands]),
-            high=np.array([hand._high for hand in env.hands]),
+            low=np.array([hand.low for hand in env.hands]),
+            high=np.array([hand.high for hand in env.hands]),
             radius=np.array([cast.table.paddle_radius, cast.table.puck_radius]),
             pucks=cast.pucks,
             normals=np.array([cast.table.normals[m.side] for m in mouths]).reshape(
