@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,11 @@ from marl_airhockey.play.court import PERSON, RATE, Court
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.session import GONE, GRACE, IDLE, Guest, Session
 from marl_airhockey.study.archive import Diary, diaries, digest, erase
+from marl_airhockey.study.course import BROKEN, Course
 from marl_airhockey.study.plan import Opponent, Plan
 
 ABSENT = 600.0
 """s after which a participant whose page is gone is held to have left."""
-VERDICT = 2.5
-"""s for which the end of a game is shown before what comes next."""
-BROKEN = "broken off"
-"""Result of a game that does not count."""
 SUBJECT, PARTNER = 0, 1
 """Seats of the participant, and of a person whom the participant meets."""
 
@@ -38,15 +35,7 @@ class Person:
 class Subject(Person):
     """The participant whose session runs."""
 
-    stage: str = "ready"
-    """ready, match, over, questions, rest, end"""
-    block: int = -1
-    """-1 is practice."""
-    game: int = 0
-    """Of the block: how many are over."""
-    until: float = 0.0
-    """When a rest, or the sight of a verdict, is over; by the clock of the study."""
-    answers: dict[str, int] = field(default_factory=dict)
+    course: Course
 
 
 def open_court(plan: Plan) -> Court:
@@ -100,8 +89,8 @@ class Study(Session):
         self.subject: Subject | None = None
         self.partner: Person | None = None
         self._erased: set[str] = set()
-        self._clock = 0.0
-        """s that the court has ticked."""
+        self._met: tuple[Course, int] | None = None
+        """For which block of whom the court is prepared."""
         # All that will be played once, so that nothing is compiled in a session.
         for opponent in (self._practice, *plan.opponents):
             if opponent is not None:
@@ -157,19 +146,28 @@ class Study(Session):
         now = time.monotonic()
         self._erased.discard(guest.key)
         if self.subject is None:
-            self._admit(Subject(guest.key, diary, now))
-            self._enter(self._first)
+            self._admit(guest.key, diary)
         else:
             self.partner = Person(guest.key, diary, now)
         self._seat_people()
 
-    def _admit(self, subject: Subject) -> None:
-        self.subject, self.recorder = subject, Recorder(subject.diary.folder)
+    def _admit(self, key: str, diary: Diary) -> None:
+        """Begin with a participant, or go on where the diary ends."""
+        course = Course(self.plan, diary)
+        self.subject = Subject(key, diary, time.monotonic(), course)
+        self.recorder = Recorder(diary.folder)
+        self._prepare()
 
-    @property
-    def _first(self) -> int:
-        """The block with which all begins."""
-        return -1 if self.plan.practice else 0
+    def _prepare(self) -> None:
+        """Have the participant's opponent at the court."""
+        course = self.subject.course if self.subject else None
+        met = (course, course.block) if course else None
+        if met == self._met:
+            return
+        self._met = met
+        if course and course.opponent:
+            invite(self.court, course.opponent)
+        self._seat_people()
 
     def _resume(self, key: str) -> None:
         """Go on with a session that was cut off, by what its diary says."""
@@ -179,22 +177,7 @@ class Study(Session):
             head = diary.rows[0]
             known = head["page"] == digest(key) and head["plan"] == self.plan.digest
             if head["role"] == "participant" and known and not diary.over:
-                self._admit(Subject(key, diary, time.monotonic()))
-                self._enter(self._first)
-                for row in list(diary.rows):
-                    self._replay(row)
-
-    def _replay(self, row: dict[str, Any]) -> None:
-        """Follow a line of the diary."""
-        subject = self.subject
-        assert subject is not None
-        if row["kind"] == "game" and row["result"] != BROKEN:
-            subject.game += 1
-            self._lead_on(subject)
-        elif row["kind"] == "answer":
-            subject.answers[row["question"]] = row["value"]
-            if subject.answers.keys() >= {q.id for q in self.plan.questions}:
-                self._enter(subject.block + 1)
+                self._admit(key, diary)
 
     def hear(self, guest: Guest, text: str) -> None:
         if self.court.phase not in ("play", "countdown"):
@@ -220,7 +203,7 @@ class Study(Session):
     def _on_next(self, guest: Guest) -> None:
         """The session is over: the next participant may come."""
         subject = self._person(guest)
-        if isinstance(subject, Subject) and subject.stage == "end":
+        if isinstance(subject, Subject) and subject.course.stage == "end":
             self._close(subject)
         self._erased.discard(guest.key)
 
@@ -248,7 +231,7 @@ class Study(Session):
         for person in (self.subject, self.partner):
             if person is None:
                 continue
-            ended = isinstance(person, Subject) and person.stage == "end"
+            ended = isinstance(person, Subject) and person.course.stage == "end"
             if now - person.seen > (GRACE if ended else ABSENT):
                 if not ended:
                     person.diary.write("end", reason="left")
@@ -256,84 +239,39 @@ class Study(Session):
 
     # What the participant goes through.
 
-    def _enter(self, block: int) -> None:
-        """Begin a block; -1 is practice."""
-        subject, plan = self.subject, self.plan
-        assert subject is not None
-        subject.block, subject.game, subject.answers = block, 0, {}
-        if block == plan.blocks:
-            subject.stage = "end"
-            if not subject.diary.over:
-                subject.diary.write("end", reason="complete")
-            return
-        opponent = self._opponent
-        if opponent is not None:
-            invite(self.court, opponent)
-        subject.stage = "rest" if block > 0 and plan.rest > 0 else "ready"
-        subject.until = self._clock + plan.rest
-        self._seat_people()
-
-    @property
-    def _opponent(self) -> Opponent | None:
-        """Whom the participant meets in this block; nobody in a game of one seat."""
-        subject, plan = self.subject, self.plan
-        if subject is None or not plan.opponents or subject.block == plan.blocks:
-            return None
-        if subject.block < 0:
-            return plan.practice_opponent
-        return plan.opponents[plan.sequence(subject.diary.number)[subject.block]]
-
-    def _place(self) -> dict[str, Any]:
-        """Where the participant is, for recordings and the diary."""
-        subject, opponent = self.subject, self._opponent
-        assert subject is not None
-        return {
-            "block": subject.block + 1,
-            "game": subject.game + 1,
-            "practice": subject.block < 0,
-            "opponent": opponent.label if opponent else "",
-        }
-
     def _on_start(self, guest: Guest) -> None:
         subject = self.subject
         if subject is None or guest.seat is None or self.free:
             return
-        if subject.stage == "match":
+        course = subject.course
+        if course.stage == "match":
             self.court.start()
-        elif subject.stage == "ready" and guest.seat == SUBJECT:
+        elif course.stage == "ready" and guest.seat == SUBJECT:
             assert self.recorder is not None
-            subject.stage = "match"
-            self.recorder.notes = {
-                "participant": subject.diary.code,
-                "plan": self.plan.digest,
-                **self._place(),
-            }
+            course.begin()
+            code, plan = subject.diary.code, self.plan.digest
+            self.recorder.notes = {"participant": code, "plan": plan, **course.place}
             self.court.start()
 
     def tick(self) -> None:
-        """One step of the court; a game, or a rest, that is over leads on."""
+        """One step of the court, and of the participant's way."""
         super().tick()
-        self._clock += 1 / RATE
-        subject = self.subject
-        if subject is None:
-            return
-        if subject.stage == "match" and self.court.phase == "done":
+        over = self.court.phase == "done"
+        if over:
             self._notice_erased()
-            self._note_game(subject)
-        elif subject.stage == "over" and self._clock >= subject.until:
-            self._lead_on(subject)
-        elif subject.stage == "rest" and self._clock >= subject.until:
-            subject.stage = "ready"
-
-    def _note_game(self, subject: Subject) -> None:
-        """A game is over; one that was broken off is played again."""
         if self.subject is None:
             return
+        course = self.subject.course
+        if course.stage == "match" and over:
+            self._note_game(course)
+        else:
+            course.wait(1 / RATE)
+        self._prepare()
+
+    def _note_game(self, course: Course) -> None:
         court, recorder = self.court, self.recorder
-        subject.diary.write(
-            "game",
-            **self._place(),
-            result=self._result,
+        course.note(
+            self._result,
             score=court.world.scenario.caption(
                 {name: value[0] for name, value in court.world.memory.items()}
             ),
@@ -341,18 +279,6 @@ class Study(Session):
             pauses=court.pauses,
             recording=recorder.path.name if recorder and recorder.path else "",
         )
-        subject.game += not self.court.reason
-        subject.stage, subject.until = "over", self._clock + VERDICT
-
-    def _lead_on(self, subject: Subject) -> None:
-        """To the next game, the questions or the next block."""
-        practice, plan = subject.block < 0, self.plan
-        subject.stage = "ready"
-        if subject.game == (plan.practice if practice else plan.games):
-            if practice or not plan.questions:
-                self._enter(subject.block + 1)
-            else:
-                subject.stage = "questions"
 
     @property
     def _result(self) -> str:
@@ -366,28 +292,10 @@ class Study(Session):
         return "drawn" if contest and not court.winners else "lost"
 
     def _on_answer(self, guest: Guest, question: str, value: int) -> None:
-        subject = self.subject
-        asked = {q.id: q for q in self.plan.questions}
-        if question not in asked or not 1 <= value <= asked[question].most:
-            raise ValueError(f"answer: {question} {value} is not asked for")
-        if subject is None or subject is not self._person(guest):
-            return
-        if subject.stage != "questions":
-            return
-        subject.answers[question] = value
-        if subject.answers.keys() < asked.keys():
-            return
-        place = self._place()
-        for name, answer in subject.answers.items():
-            subject.diary.write(
-                "answer",
-                block=place["block"],
-                opponent=place["opponent"],
-                question=name,
-                value=answer,
-                choice=asked[name].choices[answer - 1] if asked[name].choices else "",
-            )
-        self._enter(subject.block + 1)
+        person = self._person(guest)
+        if isinstance(person, Subject):
+            person.course.answer(question, value)
+            self._prepare()
 
     # What pages are told.
 
@@ -411,11 +319,8 @@ class Study(Session):
 
     def _around(self) -> dict[str, Any]:
         """Of opponents only what the plan lets participants know."""
-        opponent, subject = self._opponent, self.subject
-        name = opponent.label if opponent else ""
-        if subject is not None and self.plan.blind:
-            name = "Practice" if subject.block < 0 else f"Opponent {subject.block + 1}"
-            name = "" if opponent is None else name
+        subject = self.subject
+        name = subject.course.title if subject else ""
         others = [{"who": name, "taken": True, "title": name}]
         count = len(self.court.seats)
         return {
@@ -431,7 +336,7 @@ class Study(Session):
             return "erased"
         person = self._person(guest)
         if isinstance(person, Subject):
-            return person.stage if guest.seat is not None else "busy"
+            return person.course.stage if guest.seat is not None else "busy"
         if person is not None:
             return "partner"
         partner = self._wants_partner and self.partner is None
@@ -443,12 +348,12 @@ class Study(Session):
         if person is not None:
             stage["code"] = person.diary.code
         if isinstance(person, Subject):
-            most = self.plan.practice if person.block < 0 else self.plan.games
+            course = person.course
             stage |= {
-                "block": person.block,
-                "game": person.game,
-                "games": most,
-                "left": round(max(person.until - self._clock, 0.0)),
+                "block": course.block,
+                "game": course.game,
+                "games": course.games,
+                "left": round(course.left),
                 "waits": bool(self.free),
             }
         return {**super()._own(guest), "study": stage}
