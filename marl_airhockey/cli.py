@@ -135,7 +135,7 @@ def train(
         folder = out or Path("runs") / f"{scenario}-{seed}"
     else:
         given = (scenario, change, option, other, steps, hidden, out, engine)
-        if any(given) or num_env_runners is not None:
+        if any(given) or any(x is not None for x in (num_env_runners, init, physics)):
             raise ValueError("--resume goes on as the run was begun: give nothing else")
         config, folder = None, resume
     with bar() as progress:

@@ -1,4 +1,4 @@
-"""The commands ``airhockey study new | orders | run | erase``."""
+"""The commands ``airhockey study new | orders | run | list | erase``."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from marl_airhockey.driver import Driver
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
 from marl_airhockey.match import seat_world
-from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.play.recorder import read
 from marl_airhockey.registry import find_backend, make_scenario
 from marl_airhockey.starts import first_state
@@ -34,6 +34,8 @@ STRETCH = 0.25
 """s of a stretch."""
 APART = 0.1
 """m; an error counts no more than this: after an odd bounce all is possible."""
+JUMP = 1.5 * PUCK_SPEED_CAP
+"""m/s: what is faster than this has been moved by hand."""
 FEWEST = 50
 """Stretches that a fit needs."""
 
@@ -54,9 +56,14 @@ class Play:
     """(T,) whether a row comes a step after the one before"""
 
     def stretches(self, steps: int) -> Array:
-        """(W,) rows from which at least ``steps`` rows follow, none overlapping."""
+        """(W,) rows from which at least ``steps`` rows follow, none overlapping.
+
+        A row in which something has jumped, say a puck that was served, follows none.
+        """
+        way = np.diff(self.position, axis=0, prepend=self.position[:1])
+        jumped = np.hypot(way[..., 0], way[..., 1]).max(-1) > JUMP * self.control_dt
         run, found = 0, []
-        for row, follows in enumerate(self.follows):
+        for row, follows in enumerate(self.follows & ~jumped):
             run = run + 1 if follows else 0
             if run == steps + 1:
                 found.append(row - steps)
@@ -75,11 +82,10 @@ def play(
     fresh = True
     for _ in range(steps):
         step = world.step(nothing)
-        state = world.state
-        served = bool(state.crossed.any())
-        rows.append((state.position[0], state.velocity[0], world.sent[0], not fresh))
-        fresh = served or bool(step.terminated[0] or step.truncated[0])
-        if step.terminated[0] or step.truncated[0]:
+        place, speed = world.state.position[0].copy(), world.state.velocity[0].copy()
+        rows.append((place, speed, world.sent[0].copy(), not fresh))
+        fresh = bool(step.terminated[0] or step.truncated[0])
+        if fresh:
             world.reset()
     cast, dt = world.cast, world.control_dt
     world.close()
@@ -91,7 +97,7 @@ def recorded(paths: Sequence[Path]) -> Play:
     """Play from recordings of ``airhockey play --record``.
 
     Raises:
-        ValueError: none, several scenarios, or a scenario with blocks.
+        ValueError: none, or several scenarios.
     """
     parts: list[tuple[Array, ...]] = []
     names = set()
@@ -99,14 +105,11 @@ def recorded(paths: Sequence[Path]) -> Play:
         meta, steps, _ = read(path)
         names.add(meta["court"]["scenario"])
         scenario = make_scenario(meta["court"]["scenario"], **meta["options"])
-        if scenario.cast.blocks:
-            raise ValueError(f"{path}: blocks are not fitted; take another scenario")
         rows = np.array([row["pads"] + [p[:2] for p in row["pucks"]] for row in steps])
         speeds = np.array(
             [row["pad_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
         )
-        goals = [any(event[0] == "goal" for event in row["events"]) for row in steps]
-        follows = np.concatenate([[False], ~np.array(goals[:-1], np.bool_)])
+        follows = np.arange(len(steps)) > 0
         sent = np.array([row["sent"] for row in steps])
         parts.append((rows, speeds, sent, follows))
     if len(names) != 1:
@@ -142,23 +145,23 @@ class Fit:
         return "\n".join(lines) + "\n"
 
 
-def fit(seen: Play, start: dict[str, float] | None = None) -> Fit:
+def fit(seen: Play) -> Fit:
     """Find the physics of the 2D table that explain recorded play best.
 
     Args:
         seen: play.
-        start: values to begin with; those of the cast unless given.
 
     Raises:
-        ValueError: too little play.
+        ValueError: too little play, or a cast with blocks.
         RuntimeError: scipy is missing, with the line that installs it.
     """
     need("scipy", "robosuite")
     from scipy.optimize import differential_evolution, minimize, minimize_scalar
 
+    if seen.cast.blocks:
+        raise ValueError("fit: blocks are not fitted; take another scenario")
     model = _Model(seen)
     usual = {n: p.default for n, p in PARAMETERS.items()} | seen.cast.defaults
-    usual |= start or {}
     first = np.array([*(usual[name] for name in FITTED), 0.0])
     # Paddles alone tell the delay; contacts that take time would look like one.
     delay = minimize_scalar(

@@ -2,67 +2,39 @@
 
 import numpy as np
 import pytest
+from bench import DT, FLAT, TABLE, Bench
 from pages import aim, line
 
 import marl_airhockey as ah
 from marl_airhockey.backend import Command
 from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.physics import PARAMETERS
 from marl_airhockey.play.court import RATE, Court
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import find_backend
-from marl_airhockey.starts import first_state
-from marl_airhockey.table import GRAVITY, TABLES, half_planes, make_seat
+from marl_airhockey.table import GRAVITY, half_planes, make_seat
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("robosuite")
 
-TABLE, DT = TABLES["standard"], 0.05
 HOME = make_seat("robot", TABLE, 0)
 FASTEST = 0.9 * np.pi
 """rad/s, of a UR5e's joints; what the robot seat promises"""
 HEIGHT, TILT, FORCE, JOINT, SHARE, SPEED = range(6)
 
 
-class Bench:
-    """One world with bodies where a test wants them."""
-
-    def __init__(self, physics=None, seats=(HOME,), **cast):
-        self.cast = Cast(TABLE, seats, **cast)
-        self.backend = find_backend("robosuite")(self.cast, 1, DT, 50)
-        values = {name: p.default for name, p in PARAMETERS.items()}
-        values.update({"tilt": 0.0, "puck_damping": 0.0}, **(physics or {}))
-        rows = {name: np.full(1, value) for name, value in values.items()}
-        self.backend.set_physics(rows, np.arange(1))
-
-    def start(self, paddle, *others):
-        state = first_state(self.cast, 1)
-        state.position[0, 0] = paddle
-        for i, (x, y, vx, vy) in enumerate(others, start=len(self.cast.seats)):
-            state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
-        self.backend.start(state, np.arange(1))
-        return self
-
-    def run(self, seconds, velocity=(0.0, 0.0)):
-        command = np.zeros((1, len(self.cast.seats), 2))
-        command[0, 0] = velocity
-        return [self.backend.step(Command(command)) for _ in range(round(seconds / DT))]
-
-
 @pytest.fixture(scope="module")
 def puck():
-    return Bench(pucks=1)
+    return Bench("robosuite")
 
 
 def drive(world, driver, steps):
     """The trace (steps * substeps, seats, 6) of a world under a rule."""
     rows, positions = [], []
-    sent = world.reset(0)
+    world.reset(0)
     for k in range(steps):
-        sent = world.step(driver(k, world))
+        world.step(driver(k, world))
         rows.append(world.backend.trace[0].copy())
         positions.append(world.state.paddle[0].copy())
-    assert sent is not None
     return np.concatenate(rows), np.array(positions)
 
 
@@ -108,7 +80,7 @@ def test_a_paddle_follows_its_command(puck):
 
 
 def test_a_puck_falls_as_the_table_is_tilted():
-    bench = Bench({"tilt": 5.5}, pucks=1)
+    bench = Bench("robosuite", {"tilt": 5.5})
     pull = GRAVITY * np.sin(np.radians(5.5))
     bench.start((-0.7, 0.2), (0.5, -0.2, 0.0, 0.0))
     last = bench.run(0.5)[-1]
@@ -120,11 +92,7 @@ def test_a_puck_falls_as_the_table_is_tilted():
 @pytest.mark.parametrize("share", [0.6, 0.9])
 def test_walls_and_paddles_return_their_share(puck, speed, share):
     names = ("wall_restitution", "paddle_restitution")
-    puck.backend.worlds[0].surface.set_physics(
-        {name: p.default for name, p in PARAMETERS.items()}
-        | {"tilt": 0.0, "puck_damping": 0.0}
-        | dict.fromkeys(names, share)
-    )
+    puck.backend.worlds[0].surface.set_physics(FLAT | dict.fromkeys(names, share))
     puck.start((-0.7, 0.15), (0.0, 0.0, 0.0, speed))
     states = puck.run(0.3 / speed + 3 * DT)
     turned = [s.puck_velocity[0, 0, 1] for s in states if s.puck_velocity[0, 0, 1] < 0]
@@ -137,7 +105,7 @@ def test_walls_and_paddles_return_their_share(puck, speed, share):
 
 
 def test_drag_and_friction_are_those_of_the_other_backends():
-    bench = Bench({"puck_damping": 0.8}, pucks=1, blocks=1)
+    bench = Bench("robosuite", {"puck_damping": 0.8}, blocks=1)
     bench.start((-0.7, 0.2), (-0.3, 0.0, 0.5, 0.0), (0.0, 0.2, 0.6, 0.0))
     states = bench.run(1.0)
     np.testing.assert_allclose(
@@ -150,7 +118,7 @@ def test_drag_and_friction_are_those_of_the_other_backends():
 
 
 def test_nothing_escapes():
-    rng, bench = np.random.default_rng(0), Bench(pucks=1, path=True)
+    rng, bench = np.random.default_rng(0), Bench("robosuite", path=True)
     for _ in range(200):
         angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.2, 0.2, 2)
         way = 5 * np.cos(angle), 5 * np.sin(angle)
@@ -191,13 +159,10 @@ def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
 
 
 def test_robosuites_own_steps_are_the_same():
-    rng, bench = np.random.default_rng(3), Bench(pucks=1)
+    rng, bench = np.random.default_rng(3), Bench("robosuite")
     env = bench.backend.env
     env.reset()
-    env.surface.set_physics(
-        {name: p.default for name, p in PARAMETERS.items()}
-        | {"tilt": 0.0, "puck_damping": 0.0}
-    )
+    env.surface.set_physics(FLAT)
     home = env.hands[0].home
     bench.start(home, (-0.3, 0.02, 0.0, 0.0))
     data, own = env.sim.data._data, bench.backend.worlds[0].data

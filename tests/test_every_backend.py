@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bench import DT, TABLE, Bench
 from conftest import ideal_backends
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -10,42 +11,12 @@ from pair import Pair
 import marl_airhockey as ah
 from marl_airhockey.backend import Command
 from marl_airhockey.cast import Cast, Mouth, Obstacle
-from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
+from marl_airhockey.physics import PUCK_SPEED_CAP
 from marl_airhockey.registry import find_backend
 from marl_airhockey.starts import first_state, roll
-from marl_airhockey.table import GRAVITY, TABLES, Table, make_seat
+from marl_airhockey.table import GRAVITY, Table, make_seat
 
-TABLE = TABLES["standard"]
-DT = 0.05
 IDLE = Command(np.zeros((1, 1, 2)))
-
-
-class Bench:
-    """One world of a backend with bodies where a test wants them."""
-
-    def __init__(self, backend, physics=None, pucks=1, table=TABLE, **cast):
-        self.cast = Cast(table, (make_seat("robot", table, 0),), pucks=pucks, **cast)
-        kind = find_backend(backend)
-        self.refused = kind.supports(self.cast)
-        self.backend = kind(self.cast, 1, DT, kind.default_substeps)
-        values = {name: p.default for name, p in PARAMETERS.items()}
-        values.update({"tilt": 0.0, "puck_damping": 0.0}, **(physics or {}))
-        rows = {name: np.full(1, value) for name, value in values.items()}
-        self.backend.set_physics(rows, np.arange(1))
-
-    def start(self, paddle, *others):
-        """Place the paddle at (x, y) and the others at (x, y, vx, vy)."""
-        state = first_state(self.cast, 1)
-        state.position[0, 0] = paddle
-        for i, (x, y, vx, vy) in enumerate(others, start=1):
-            state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
-        self.backend.start(state, np.arange(1))
-        return state
-
-    def run(self, seconds, velocity=(0.0, 0.0)):
-        command = Command(np.array([[velocity]], dtype=float))
-        states = [self.backend.step(command) for _ in range(round(seconds / DT))]
-        return states
 
 
 @pytest.mark.parametrize("speed", [0.02, 0.1, 0.3, 1.0, 3.0, 4.9])

@@ -63,3 +63,16 @@ def test_recordings_are_fitted_to(tmp_path):
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.1)
     with pytest.raises(ValueError, match="too few"):
         fit(play("juggle", make_driver("striker"), 100, 0, {}))
+    with pytest.raises(ValueError, match="blocks"):
+        fit(play("move_block", make_driver("striker"), 10, 0, {}))
+
+
+def test_a_puck_that_is_served_is_not_fitted_to():
+    drivers = {"paddle_1": "still"}
+    options = {"drivers": drivers, "options": {"seats": "arcade"}}
+    seen = play("duel", make_driver("striker"), 1500, 0, options)
+    way = np.hypot(*np.diff(seen.position[:, 2], axis=0).T)
+    served = np.flatnonzero(way > 0.4) + 1
+    assert len(served) > 2
+    for first in seen.stretches(5):
+        assert not ((served > first) & (served <= first + 5)).any()

@@ -47,6 +47,8 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
     )
     with pytest.raises(ValueError, match="another size"):
         train(wrong, tmp_path / "wrong")
+    with pytest.raises(ValueError, match="sb3 can begin"):
+        preset("reach", {**SMALL, "init": "x", "engine": "rllib"})
     lost = preset("reach", {**SMALL, "init": str(tmp_path / "nowhere")})
     with pytest.raises(ValueError, match="no folder of a run"):
         train(lost, tmp_path / "lost")

@@ -180,7 +180,7 @@ class AirHockey(ManipulationEnv):
         for k in range(model.ngeom):
             name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_GEOM, k) or ""
             if name.startswith(("robot", "mount", "fixed_mount")):
-                # The links stay clear of everything; see `reach.py`.
+                # Only the paddle touches anything: links pass through what is there.
                 model.geom_contype[k] = model.geom_conaffinity[k] = 0
 
     def _setup_references(self) -> None:

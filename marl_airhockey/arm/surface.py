@@ -10,6 +10,7 @@ from numba import njit
 
 from marl_airhockey.arm.contact import solref
 from marl_airhockey.arm.place import Place
+from marl_airhockey.arm.scene import RAIL, SLIDES
 from marl_airhockey.cast import Cast
 from marl_airhockey.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.state import Array
@@ -86,7 +87,7 @@ class Surface:
 
     def put_out(self, puck: int, out: bool) -> None:
         """Take a puck off the table, or put it back on: it touches nothing then."""
-        bits = 0 if out else 2 | 8
+        bits = 0 if out else SLIDES | RAIL
         side = self._sides[puck]
         self._model.geom_contype[side] = self._model.geom_conaffinity[side] = bits
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from marl_airhockey.arm.hand import leashed
 from marl_airhockey.arm.law import reference
-from marl_airhockey.arm.lean import TRACE, Report, Simulation, Table, fresh
+from marl_airhockey.arm.lean import Report, Simulation, Table, fresh
 from marl_airhockey.arm.pose import reach_for
 from marl_airhockey.arm.surface import Surface
 from marl_airhockey.state import Array
@@ -32,7 +32,6 @@ class Arms:
     def __init__(
         self, env: Any, model: Any, path: tuple[int, ...], trace: Array, data: Any
     ) -> None:
-        assert trace.shape[-1] == len(TRACE)
         self._env, self.model, self.data = env, model, mujoco.MjData(model)
         cast, d = env.cast, self.data
         d.qpos[:] = data.qpos

@@ -22,7 +22,7 @@ from marl_airhockey.table import TABLES, make_seat
 if TYPE_CHECKING:
     from marl_airhockey.arm.camera import Camera
 
-TESTED = "robosuite==1.5.2", "mujoco==3.9.0"
+NEWEST = "mujoco==3.9.0"
 
 
 class Robosuite(Backend):
@@ -30,7 +30,7 @@ class Robosuite(Backend):
 
     Paddles track their command as an arm can, and feel the pucks; contacts take some
     milliseconds. A told paddle is asked to go there, at its seat's top speed at most.
-    ``trace`` has what the arms did at every physics step, (B, substeps, seats, 6).
+    ``trace`` is what the arms did at every physics step: see `arm.lean.TRACE`.
     """
 
     exact: ClassVar[bool] = True
@@ -47,7 +47,7 @@ class Robosuite(Backend):
                 )
         version = metadata.version("mujoco")
         if tuple(int(n) for n in version.split(".")[:2]) > (3, 9):
-            return f"mujoco {version} is too new for robosuite: pip install {TESTED[1]}"
+            return f"mujoco {version} is too new for robosuite: pip install {NEWEST}"
         return None
 
     @classmethod
@@ -75,7 +75,7 @@ class Robosuite(Backend):
         # Robosuite warns of files that nobody needs; errors are shown.
         log = logging.getLogger("robosuite_logs")
         log.addFilter(lambda record: record.levelno >= logging.ERROR)
-        from marl_airhockey.arm.lean import Table
+        from marl_airhockey.arm.lean import TRACE, Table
         from marl_airhockey.arm.robot import AirHockey
         from marl_airhockey.arm.world import Arms
 
@@ -102,7 +102,7 @@ class Robosuite(Backend):
             ways=np.array([cast.opening(m) for m in mouths]).reshape(-1, 2, 2),
             whole=np.array([m.width is None for m in mouths], np.bool_),
         )
-        self.trace = np.zeros((num_worlds, substeps, len(cast.seats), 6))
+        self.trace = np.zeros((num_worlds, substeps, len(cast.seats), len(TRACE)))
         self.worlds = [
             Arms(env, copy.copy(model), self._path_shape[1:], self.trace[i], data)
             for i in range(num_worlds)

@@ -59,8 +59,7 @@ class TrainConfig:
     """Of rllib: processes that step the worlds; 0 for none besides the learner's."""
 
     init: str = ""
-    """Of sb3: the folder of a run of the same size, whose weights training begins with.
-    Its card must say the same observation."""
+    """Of sb3: folder of a run of the same size, with whose weights training begins."""
 
     total_steps: int
     """Steps of single worlds, over all of them."""
@@ -138,6 +137,8 @@ class TrainConfig:
                 "engine: rllib learns from flat observations here; take sb3 for "
                 'observe="pixels" and goals="dict"'
             )
+        if self.init:
+            raise ValueError("init: sb3 can begin with the weights of a run, rllib not")
         runners = self.num_env_runners
         if runners < 0 or self.num_worlds % max(runners, 1):
             raise ValueError(

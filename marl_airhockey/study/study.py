@@ -178,6 +178,7 @@ class Study(Session):
             known = head["page"] == digest(key) and head["plan"] == self.plan.digest
             if head["role"] == "participant" and known and not diary.over:
                 self._admit(key, diary)
+                return
 
     def hear(self, guest: Guest, text: str) -> None:
         if self.court.phase not in ("play", "countdown"):

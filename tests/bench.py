@@ -1,0 +1,42 @@
+"""One world of a backend with bodies where a test wants them."""
+
+import numpy as np
+
+from marl_airhockey.backend import Command
+from marl_airhockey.cast import Cast
+from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.registry import find_backend
+from marl_airhockey.starts import first_state
+from marl_airhockey.table import TABLES, make_seat
+
+TABLE = TABLES["standard"]
+DT = 0.05
+FLAT = {name: p.default for name, p in PARAMETERS.items()} | {
+    "tilt": 0.0,
+    "puck_damping": 0.0,
+}
+"""The usual physics, but for a flat table without drag."""
+
+
+class Bench:
+    def __init__(self, backend, physics=None, pucks=1, table=TABLE, **cast):
+        self.cast = Cast(table, (make_seat("robot", table, 0),), pucks=pucks, **cast)
+        kind = find_backend(backend)
+        self.refused = kind.supports(self.cast)
+        self.backend = kind(self.cast, 1, DT, kind.default_substeps)
+        values = FLAT | (physics or {})
+        rows = {name: np.full(1, value) for name, value in values.items()}
+        self.backend.set_physics(rows, np.arange(1))
+
+    def start(self, paddle, *others):
+        """Place the paddle at (x, y) and the others at (x, y, vx, vy)."""
+        state = first_state(self.cast, 1)
+        state.position[0, 0] = paddle
+        for i, (x, y, vx, vy) in enumerate(others, start=1):
+            state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
+        self.backend.start(state, np.arange(1))
+        return state
+
+    def run(self, seconds, velocity=(0.0, 0.0)):
+        command = Command(np.array([[velocity]], dtype=float))
+        return [self.backend.step(command) for _ in range(round(seconds / DT))]
