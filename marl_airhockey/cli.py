@@ -22,6 +22,7 @@ from marl_airhockey.cli_common import (
     Physics,
     Profile,
     Scenario,
+    Workers,
     app,
     bar,
     console,
@@ -105,6 +106,7 @@ def train(
     other: Drivers = None,
     physics: Physics = None,
     resume: Annotated[Path | None, typer.Option(help="Go on with this run.")] = None,
+    num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
@@ -183,6 +185,7 @@ def evaluate_driver(
     other: Drivers = None,
     physics: Physics = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
+    num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
     """Measure a driver over episodes that training never sees."""
@@ -310,9 +313,10 @@ def bench_environments(
     rounds: Annotated[int, typer.Option(help="Turns.")] = 3,
     seconds: Annotated[float, typer.Option(help="CPU-seconds of a turn.")] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Draw a PNG here.")] = None,
+    num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure env-steps per second; MARL_AIRHOCKEY_THREADS=N steps on N threads."""
+    """Measure env-steps per second, of CPU and of time."""
     from marl_airhockey.bench import Case, measure, picture
 
     try:

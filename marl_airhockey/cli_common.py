@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from marl_airhockey.make import Keywords
 from marl_airhockey.physics import load_physics
+from marl_airhockey.threads import use_threads
 
 app = typer.Typer(
     help="Air hockey for robot learning and multi-agent RL.",
@@ -30,6 +31,15 @@ Options = Annotated[
 ]
 Physics = Annotated[
     Path | None, typer.Option(help="A preset of physics, TOML; see airhockey fit.")
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--num-workers",
+        help="Threads that step the worlds; else MARL_AIRHOCKEY_THREADS says, or 1.",
+        min=1,
+        callback=use_threads,
+    ),
 ]
 Drivers = Annotated[
     list[str] | None,

@@ -9,7 +9,15 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli_common import AsJson, Options, Physics, bar, console, settings
+from marl_airhockey.cli_common import (
+    AsJson,
+    Options,
+    Physics,
+    Workers,
+    bar,
+    console,
+    settings,
+)
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
 from marl_airhockey.physics import PARAMETERS, load_physics
@@ -40,6 +48,7 @@ def transfer(
         Path | None, typer.Option(help="Folder of runs and results.")
     ] = None,
     option: Options = None,
+    num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
     """How do policies from the 2D table do elsewhere? Success with 95 % intervals."""

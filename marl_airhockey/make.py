@@ -89,7 +89,8 @@ def build_world(
     max_cycles = keywords.get("max_cycles")
     _check_times(control_dt, substeps, max_cycles)
     profile = keywords.get("profile", "ideal")
-    physics = Physics(cast.defaults, profile, keywords.get("physics"))
+    given = keywords.get("physics")
+    physics = Physics(cast.defaults, profile, given, arms=not kind.ideal)
     usual = "history" if profile == "robot" else "velocity"
     agents = [f"paddle_{i}" for i in range(len(cast.seats))]
     drivers: dict[int, Driver] = {}

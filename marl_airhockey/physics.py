@@ -29,6 +29,8 @@ class Parameter:
     high: float
     unit: str
     meaning: str
+    arms: bool = False
+    """Of arms alone: paddles that follow their command exactly have no such thing."""
 
 
 PARAMETERS: dict[str, Parameter] = {
@@ -46,6 +48,9 @@ PARAMETERS: dict[str, Parameter] = {
     "observation_delay": Parameter(0.0, 0.0, 0.25, "s", "age of what is seen"),
     "position_noise": Parameter(0.0, 0.0, 0.05, "m", "standard deviation, per axis"),
     "occlusion": Parameter(0.0, 0.0, 0.5, "1", "share of time a puck is unseen"),
+    "arm_stiffness": Parameter(400.0, 25.0, 1600.0, "1/s2", "of following", arms=True),
+    "arm_force": Parameter(40.0, 5.0, 80.0, "N", "of a paddle on the table", arms=True),
+    "arm_payload": Parameter(0.0, 0.0, 1.0, "kg", "unknown to the arm", arms=True),
 }
 """Every physical parameter. A pair's restitution is the lower of its bodies', a puck's
 being 1."""
@@ -71,6 +76,7 @@ class Physics:
         base: values that replace the defaults (table, seats, scenario).
         profile: "ideal", or "robot" for delays, noise and a spread of +-15 %.
         given: the user's values and ranges; these win.
+        arms: whether arms hold the paddles, which have parameters, too.
 
     Raises:
         ValueError: an unknown name, or a value outside its sane bounds.
@@ -81,11 +87,14 @@ class Physics:
         base: Mapping[str, float],
         profile: str = "ideal",
         given: Mapping[str, Value] | None = None,
+        arms: bool = False,
     ) -> None:
         if profile not in PROFILES:
             raise ValueError(unknown("profile", profile, PROFILES))
         self.ranges: dict[str, tuple[float, float]] = {}
         for name, parameter in PARAMETERS.items():
+            if parameter.arms and not arms:
+                continue
             value = base.get(name, parameter.default)
             spread = 0.0
             if profile == "robot":
@@ -94,7 +103,13 @@ class Physics:
             high = min(value + spread, parameter.high)
             self.ranges[name] = (value - spread, high)
         for name, chosen in (given or {}).items():
-            self.ranges[name] = _checked(name, chosen)
+            pair = _checked(name, chosen)
+            if name not in self.ranges:
+                raise ValueError(
+                    f"physics[{name!r}] is of arms, and this backend has none: "
+                    "leave it out, or take backend='robosuite'"
+                )
+            self.ranges[name] = pair
 
     def draw(self, draws: Draws) -> dict[str, Array]:
         """One value of every parameter for each of W worlds: name -> (W,)."""

@@ -13,7 +13,7 @@ from functools import cache
 from itertools import pairwise
 
 LEAST = 2048
-"""Rows that a thread is worth."""
+"""Rows of cheap worlds that a thread is worth."""
 
 
 @cache
@@ -31,14 +31,34 @@ def threads() -> int:
     return int(given)
 
 
+def use_threads(number: int | None) -> int | None:
+    """Let there be so many threads, here and in processes that begin here.
+
+    Raises:
+        ValueError: fewer than one.
+    """
+    if number is not None:
+        os.environ["MARL_AIRHOCKEY_THREADS"] = str(number)
+        threads.cache_clear()
+        _pool.cache_clear()
+        threads()
+    return number
+
+
 @cache
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads(), "marl_airhockey")
 
 
-def over_rows(work: Callable[[slice], None], rows: int) -> None:
-    """Call ``work`` on slices of rows 0 .. ``rows``, side by side."""
-    parts = min(threads(), rows // LEAST)
+def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> None:
+    """Call ``work`` on slices of rows 0 .. ``rows``, side by side.
+
+    Args:
+        work: done for a slice.
+        rows: how many there are.
+        least: rows that a thread is worth.
+    """
+    parts = min(threads(), rows // least)
     if parts < 2:
         work(slice(None))
         return

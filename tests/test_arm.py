@@ -12,9 +12,12 @@ from marl_airhockey.play.court import RATE, Court
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import find_backend
 from marl_airhockey.table import GRAVITY, half_planes, make_seat
+from marl_airhockey.threads import use_threads
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("robosuite")
+
+from marl_airhockey.arm.law import forget  # noqa: E402
 
 HOME = make_seat("robot", TABLE, 0)
 FASTEST = 0.9 * np.pi
@@ -205,6 +208,69 @@ def test_a_row_does_not_depend_on_the_others():
         return world.state.position[0]
 
     np.testing.assert_array_equal(run(1), run(3))
+
+
+def test_workers_change_nothing(monkeypatch):
+    def run():
+        world = ah.make_world("juggle", num_worlds=3, backend="robosuite")
+        world.reset(5)
+        for k in range(20):
+            world.step(np.full((3, 1, 2), np.sin(k)))
+        return world.state.position
+
+    monkeypatch.setenv("MARL_AIRHOCKEY_THREADS", "1")
+    alone = run()
+    try:
+        use_threads(2)
+        np.testing.assert_array_equal(run(), alone)
+    finally:
+        use_threads(1)
+
+
+def test_the_law_does_not_know_of_a_payload():
+    bench = Bench("robosuite")
+    world, mass = bench.backend.worlds[0], {}
+    bench.start((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
+    for load in (0.0, 0.6):
+        world.set_physics(FLAT | {"arm_payload": load})
+        first = world.sim.arms[0, 1]
+        own = slice(first, first + 6)
+        speeds = world.data.qvel[own]
+        speeds[:] = (0.3, -0.2, 0.4, 0.1, -0.5, 0.2)
+        mujoco.mj_step1(world.model, world.data)
+        jacobian, rate = np.zeros((2, 6, world.model.nv))
+        site = world.sim.arms[0, 3]
+        place, body = world.data.site_xpos[site], world.model.site_bodyid[site]
+        mujoco.mj_jacSite(world.model, world.data, jacobian[:3], jacobian[3:], site)
+        mujoco.mj_jacDot(world.model, world.data, rate[:3], rate[3:], place, body)
+        full = np.zeros((world.model.nv, world.model.nv))
+        mujoco.mj_fullM(world.model, full, world.data.qM)
+        felt, bias = full[own, own].copy(), world.data.qfrc_bias[own].copy()
+        mass[load] = felt.copy(), bias.copy()
+        down, drift = world.model.opt.gravity, rate[:, own] @ speeds
+        forget(load, down, jacobian[:, own].copy(), drift, felt, bias)
+        np.testing.assert_allclose(felt, mass[0.0][0], atol=1e-9)
+        np.testing.assert_allclose(bias, mass[0.0][1], atol=1e-9)
+    assert np.abs(mass[0.6][0] - mass[0.0][0]).max() > 0.05
+    assert np.abs(mass[0.6][1] - mass[0.0][1]).max() > 1.0
+
+
+def test_arms_differ_from_world_to_world():
+    pushed = {}
+    for name, value in (("arm_force", 20.0), ("arm_payload", 1.0), ("tilt", 5.5)):
+        world = ah.make_world("juggle", backend="robosuite", physics={name: value})
+        trace, _ = drive(world, unsteady(np.random.default_rng(1)), 40)
+        assert np.abs(trace[..., HEIGHT]).max() < 1e-3
+        pushed[name] = trace[..., FORCE].mean()
+    assert pushed["arm_force"] == pytest.approx(20.0, rel=0.1)
+    assert pushed["arm_payload"] - pushed["tilt"] == pytest.approx(GRAVITY, rel=0.1)
+    arms = ah.make_world("juggle", 4, backend="robosuite", profile="robot")
+    arms.reset(0)
+    stiff = [world.sim.gains[0, 0] for world in arms.backend.worlds]
+    np.testing.assert_allclose(stiff, arms.episode.physics["arm_stiffness"])
+    assert len(set(stiff)) == 4
+    with pytest.raises(ValueError, match=r"'arm_force'. is of arms.*backend='robos"):
+        ah.make_world("juggle", backend="batched", physics={"arm_force": 30.0})
 
 
 def test_it_is_seen_from_three_cameras():

@@ -12,6 +12,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numba import njit
 
+from marl_airhockey.physics import PARAMETERS
 from marl_airhockey.state import Array
 
 
@@ -19,7 +20,7 @@ from marl_airhockey.state import Array
 class Gains:
     """Gains of the law; damping follows from the stiffness."""
 
-    plane: float = 400.0
+    plane: float = PARAMETERS["arm_stiffness"].default
     """1/s2, of the position in the plane"""
     plane_ratio: float = 1.0
     """Damping ratio in the plane"""
@@ -33,7 +34,7 @@ class Gains:
     """Damping ratio of the orientation"""
     correction: float = 5.0
     """m/s2, largest acceleration beside that of the reference"""
-    force: float = 40.0
+    force: float = PARAMETERS["arm_force"].default
     """N, on the table. With 20 N, and a fourth of the stiffness in turning, a puck that
     is jammed in a corner could tip the paddle by 4 degrees."""
 
@@ -153,6 +154,34 @@ def torques(
     for j in range(n):
         out[j] = min(max(out[j] + share * motion[j], low[j]), high[j])
     return share
+
+
+@njit(cache=True)
+def forget(
+    load: float,
+    gravity: Array,
+    jacobian: Array,
+    drift: Array,
+    mass: Array,
+    bias: Array,
+) -> None:
+    """Take a point mass at the paddle's foot out of what the law knows of its arm.
+
+    Args:
+        load: kg.
+        gravity: (3,) m/s2, world frame.
+        jacobian: (6, n) of the foot.
+        drift: (6,) its time derivative times the joint speeds.
+        mass: (n, n) joint-space inertia, changed.
+        bias: (n,) gravity, Coriolis and centrifugal torques, changed.
+    """
+    n = len(bias)
+    for i in range(n):
+        for k in range(3):
+            pull = load * jacobian[k, i]
+            bias[i] -= pull * (drift[k] - gravity[k])
+            for j in range(n):
+                mass[i, j] -= pull * jacobian[k, j]
 
 
 @njit(cache=True)

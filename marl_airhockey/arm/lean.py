@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from marl_airhockey.arm.law import reference, torques
+from marl_airhockey.arm.law import forget, reference, torques
 from marl_airhockey.arm.native import (
     full_mass,
     jacobian_rate,
@@ -48,6 +48,12 @@ class Simulation(NamedTuple):
     """(movers, 2) place in qpos, in qvel"""
     surface: Array
     """(movers, 3) of `surface.Surface.rows`"""
+    gravity: Array
+    """(3,) m/s2"""
+    gains: Array
+    """(seats, 8) of `law.Gains`"""
+    loads: Array
+    """(seats,) kg at the feet, of which the law does not know"""
 
 
 class Table(NamedTuple):
@@ -57,7 +63,6 @@ class Table(NamedTuple):
     rotation: Array
     grips: Array
     """(seats, 3, 3)"""
-    gains: Array
     low: Array
     """(seats, 6) Nm"""
     high: Array
@@ -93,7 +98,7 @@ class Report(NamedTuple):
     """(substeps, seats, len(TRACE))"""
 
 
-@njit(cache=False)
+@njit(cache=True, nogil=True)
 def advance(
     sim: Any,
     table: Any,
@@ -148,18 +153,22 @@ def advance(
                 for j in range(6):
                     drift[i] += rate[i, joint + j] * speeds[j]
             reference(start[s], old[s], new[s], dt * substeps, dt * k, wanted)
+            own = jacobian[:, joint : joint + 6].copy()
+            inertia = mass[joint : joint + 6, joint : joint + 6].copy()
+            bias = sim.bias[joint : joint + 6].copy()
+            forget(sim.loads[s], sim.gravity, own, drift, inertia, bias)
             share = torques(
-                jacobian[:, joint : joint + 6].copy(),
+                own,
                 drift,
-                mass[joint : joint + 6, joint : joint + 6].copy(),
-                sim.bias[joint : joint + 6].copy(),
+                inertia,
+                bias,
                 speeds,
                 _local(table, sim.places[site]),
                 sim.turns[site].reshape(3, 3),
                 table.rotation,
                 table.grips[s],
                 wanted,
-                table.gains,
+                sim.gains[s],
                 table.low[s],
                 table.high[s],
                 out,
@@ -178,7 +187,7 @@ def advance(
             _record(sim, report, k + 1)
 
 
-@njit(cache=False)
+@njit(cache=True)
 def fresh(sim: Any, table: Any, report: Any) -> None:
     """Bring a world's derived arrays, paddles and contacts up to its positions."""
     step1(sim.model, sim.data)
@@ -186,7 +195,7 @@ def fresh(sim: Any, table: Any, report: Any) -> None:
     _events(sim, table, report, 0.0)
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _local(table: Any, place: Array) -> Array:
     """(3,) in the table frame."""
     found = np.zeros(3)
@@ -196,7 +205,7 @@ def _local(table: Any, place: Array) -> Array:
     return found
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _see(sim: Any, table: Any, report: Any, k: int, jacobian: Array) -> None:
     """Where the paddles are, how fast, and the row of the trace."""
     for s in range(len(sim.arms)):
@@ -224,7 +233,7 @@ def _see(sim: Any, table: Any, report: Any, k: int, jacobian: Array) -> None:
         row[5] = np.hypot(report.paddles[s, 2], report.paddles[s, 3])
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _events(sim: Any, table: Any, report: Any, elapsed: float) -> None:
     """Contacts that begin and mouths that are crossed."""
     near = table.radius[0] + table.radius[1]
@@ -255,7 +264,7 @@ def _events(sim: Any, table: Any, report: Any, elapsed: float) -> None:
             report.beyond[p, m] = past
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _record(sim: Any, report: Any, k: int) -> None:
     """A row of the path."""
     seats = len(sim.arms)

@@ -1,26 +1,24 @@
-"""MuJoCo's own functions, called from compiled code by their addresses."""
+"""MuJoCo's own functions, called by name from compiled code (and cached with it)."""
 
 from __future__ import annotations
 
-import ctypes
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import mujoco
+from numba import types
 
-_library = ctypes.CDLL(
+llvm.load_library_permanently(
     str(next(iter(sorted(Path(mujoco.__file__).parent.glob("*mujoco*.[sd]*")))))
 )
 
 
 def _function(name: str, *arguments: Any) -> Any:
-    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *arguments)
-    address = ctypes.cast(getattr(_library, name), ctypes.c_void_p).value
-    assert address is not None
-    return kind(address)
+    return types.ExternalFunction(name, types.void(types.intp, *arguments))
 
 
-_p, _i = ctypes.c_void_p, ctypes.c_int
+_p, _i = types.intp, types.int32
 step1 = _function("mj_step1", _p)
 """Model, data: all that follows from positions and velocities."""
 step2 = _function("mj_step2", _p)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from marl_airhockey.arm.hand import leashed
-from marl_airhockey.arm.law import reference
+from marl_airhockey.arm.law import Gains, reference
 from marl_airhockey.arm.lean import Report, Simulation, Table, fresh
 from marl_airhockey.arm.pose import reach_for
 from marl_airhockey.arm.surface import Surface
@@ -72,6 +72,9 @@ class Arms:
             np.array(arms, np.int64),
             np.stack([places, dofs], 1),
             self.surface.rows,
+            model.opt.gravity,
+            np.array([hand.gains for hand in env.hands]),
+            np.zeros(self._seats),
         )
         pairs, mouths = (self._seats, self._pucks), len(cast.mouths)
         crossings = self._pucks, mouths
@@ -89,6 +92,16 @@ class Arms:
         self._ahead = np.zeros((self._seats, 2))
         self._whole = np.array([m.width is None for m in cast.mouths], np.bool_)
         self._out = np.zeros(self._pucks, np.bool_)
+
+    def set_physics(self, values: dict[str, float]) -> None:
+        """Set the physical parameters of table and arms."""
+        self.sim.gains[:] = Gains(
+            plane=values["arm_stiffness"], force=values["arm_force"]
+        ).array
+        self.sim.loads[:] = values["arm_payload"]
+        # The body of the site has no mass of its own.
+        self.model.body_mass[self.model.site_bodyid[self._sites]] = self.sim.loads
+        self.surface.set_physics(values)
 
     def start(
         self, table: Table, position: Array, velocity: Array, angle: Array

@@ -18,6 +18,7 @@ from marl_airhockey.cast import Cast
 from marl_airhockey.scenario import Mark
 from marl_airhockey.state import Array, State
 from marl_airhockey.table import TABLES, make_seat
+from marl_airhockey.threads import over_rows
 
 if TYPE_CHECKING:
     from marl_airhockey.arm.camera import Camera
@@ -90,7 +91,6 @@ class Robosuite(Backend):
             origin=place.origin,
             rotation=place.rotation,
             grips=np.array([hand.grip for hand in env.hands]),
-            gains=env.hands[0].gains,
             low=np.array([hand.low for hand in env.hands]),
             high=np.array([hand.high for hand in env.hands]),
             radius=np.array([cast.table.paddle_radius, cast.table.puck_radius]),
@@ -114,7 +114,7 @@ class Robosuite(Backend):
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         for i in worlds.tolist():
             row = {name: float(value[i]) for name, value in values.items()}
-            self.worlds[i].surface.set_physics(row)
+            self.worlds[i].set_physics(row)
 
     def start(self, state: State, worlds: Array) -> None:
         self.state = state
@@ -139,18 +139,27 @@ class Robosuite(Backend):
         }
         events: dict[str, list[Array]] = {}
         path = np.empty(self._path_shape)
+        starts = [
+            world.lead(self._old[i], goal[i], self.control_dt)
+            for i, world in enumerate(self.worlds)
+        ]
+
+        def move(rows: slice) -> None:
+            for i in range(*rows.indices(self.num_worlds)):
+                world = self.worlds[i]
+                advance(
+                    world.sim,
+                    self._table,
+                    world.report,
+                    starts[i],
+                    self._old[i],
+                    goal[i],
+                    self._dt,
+                    self.substeps,
+                )
+
+        over_rows(move, self.num_worlds, least=1)
         for i, world in enumerate(self.worlds):
-            start = world.lead(self._old[i], goal[i], self.control_dt)
-            advance(
-                world.sim,
-                self._table,
-                world.report,
-                start,
-                self._old[i],
-                goal[i],
-                self._dt,
-                self.substeps,
-            )
             world.retire()
             world.read(arrays, i)
             path[i] = world.report.path
