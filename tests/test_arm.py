@@ -92,7 +92,7 @@ def test_a_puck_falls_as_the_table_is_tilted():
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0, 3.0, 5.0])
-@pytest.mark.parametrize("share", [0.6, 0.9])
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.6, 0.9])
 def test_walls_and_paddles_return_their_share(puck, speed, share):
     names = ("wall_restitution", "paddle_restitution")
     puck.backend.worlds[0].surface.set_physics(FLAT | dict.fromkeys(names, share))
