@@ -117,11 +117,3 @@ class Batch(NamedTuple):
     last: Last
     motion: Motion
     events: Events
-
-    def rows(self, rows: slice) -> Batch:
-        """Some of the worlds."""
-        order = Order(*[array[rows] for array in self.order])
-        last = Last(*[array[rows] for array in self.last])
-        motion = Motion(*[array[rows] for array in self.motion])
-        events = Events(*[array[rows] for array in self.events])
-        return Batch(self.ground, self.law[rows], order, last, motion, events)

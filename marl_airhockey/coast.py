@@ -22,12 +22,24 @@ from marl_airhockey.state import Array
 def begin(batch: Batch) -> None:
     """Everything as it was at the end of the last step, and nothing has happened."""
     last, motion, events = batch.last, batch.motion, batch.events
-    motion.position[:] = last.position
-    motion.velocity[:] = last.velocity
-    motion.time[:] = last.time + batch.ground.control_dt
-    events.touched[:], events.touched_at[:] = 0, np.nan
-    events.touching[:] = last.touching
-    events.crossed[:], events.crossed_velocity[:] = False, 0.0
+    # Loops: for few worlds, numba's copies of whole arrays cost more than what they do.
+    worlds, bodies, _ = motion.position.shape
+    _, paddles, pucks = events.touched.shape
+    mouths = events.crossed.shape[2]
+    for b in range(worlds):
+        motion.time[b] = last.time[b] + batch.ground.control_dt
+        for i in range(bodies):
+            for axis in range(2):
+                motion.position[b, i, axis] = last.position[b, i, axis]
+                motion.velocity[b, i, axis] = last.velocity[b, i, axis]
+        for k in range(pucks):
+            for i in range(paddles):
+                events.touched[b, i, k], events.touched_at[b, i, k] = 0, np.nan
+                events.touching[b, i, k] = last.touching[b, i, k]
+            for m in range(mouths):
+                events.crossed[b, k, m] = False
+                events.crossed_velocity[b, k, m, 0] = 0.0
+                events.crossed_velocity[b, k, m, 1] = 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -44,15 +44,8 @@ from marl_airhockey.rails import SQUEEZE, slip, wall
 from marl_airhockey.state import Array
 
 
-def advance(batch: Batch) -> None:
-    """Move B worlds by a control step, in place."""
-    # Unpacked on the way in: numba is slow to take tuples of arrays from Python.
-    ground, law, order, last, motion, events = batch
-    _advance(*ground, law, *order, *last, *motion, *events)
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def _advance(
+def advance(
     paddles: int,
     pucks: int,
     blocks: int,
@@ -84,6 +77,11 @@ def _advance(
     leaning: Array,
     out: Array,
 ) -> None:
+    """Move B worlds by a control step, in place.
+
+    Takes the arrays of a `Batch` one by one: numba is slow to take tuples of arrays
+    from Python, and Python to make them.
+    """
     ground = Ground(
         paddles, pucks, blocks, radius, lines, mouths, obstacles, control_dt, substeps
     )
@@ -99,7 +97,8 @@ def _advance(
     if motion.path.shape[1] == 0:
         find_busy(batch, busy)
         coast(batch, busy)
-    _substeps(batch, busy)
+    if busy.any():
+        _substeps(batch, busy)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -50,7 +50,7 @@ class Observer:
                 p for p in self.scenario.observation if not (apart and p.goal)
             )
             self._layouts[observe] = layout = Layout(pieces, scope)
-            self._shows[observe] = self._show(layout)
+            self._shows[observe] = self._compiled(layout)
         return self._layouts[observe]
 
     @property
@@ -81,6 +81,10 @@ class Observer:
         self.prepare(observe)
         history = {"history": self.sensor.history[worlds]}
         (shown,) = self._shows[observe](vars(sensed), memory, history)
+        return self.take(shown, seats)
+
+    def take(self, shown: Sink, seats: Array) -> Observation:
+        """The observations of some seats, of what is shown to all."""
         if len(seats) != len(self.scenario.cast.seats):
             shown["flat"] = shown["flat"][:, seats]
         if len(shown) == 1:
@@ -88,24 +92,37 @@ class Observer:
         flat = shown.pop("flat")
         return {"observation": flat, **shown}
 
-    def _show(self, layout: Layout) -> Fused:
-        """What reads a layout, and the goals beside it, as one compiled loop."""
+    def show(self, state: State, memory: Memory) -> Sink:
+        """What all seats are shown of a state that is sensed as it is.
+
+        Empty where it takes more than that: a sensor, the past, or a picture.
+        """
+        if self.observe != "velocity" or not self.sensor.ideal:
+            return {}
+        return self._flat(self.layout, state, memory, self.sensor.history)
+
+    def _flat(
+        self, layout: Layout, state: State, memory: Memory, history: Array
+    ) -> Sink:
+        """What reads a layout, and the goals beside it."""
         game = self.scenario
+        shown = {"flat": layout.read(Ego(state, memory, history, layout.scope))}
+        if game.goals == "dict" and isinstance(game, GoalScenario):
+            goals = {
+                "achieved_goal": game.achieved(state, memory),
+                "desired_goal": game.desired(memory),
+            }
+            for name, goal in goals.items():
+                shown[name] = goal[..., None, :].astype(np.float32)
+        return shown
+
+    def _compiled(self, layout: Layout) -> Fused:
+        """The same as one loop over the worlds."""
 
         def show(sensed: Source, memory: Memory, sensor: Source) -> tuple[Sink]:
-            state = State(**sensed)
-            ego = Ego(state, memory, sensor["history"], layout.scope)
-            shown = {"flat": layout.read(ego)}
-            if game.goals == "dict" and isinstance(game, GoalScenario):
-                goals = {
-                    "achieved_goal": game.achieved(state, memory),
-                    "desired_goal": game.desired(memory),
-                }
-                for name, goal in goals.items():
-                    shown[name] = goal[..., None, :].astype(np.float32)
-            return (shown,)
+            return (self._flat(layout, State(**sensed), memory, sensor["history"]),)
 
-        return Fused(show, f"the observation of {game.name!r}")
+        return Fused(show, f"the observation of {self.scenario.name!r}")
 
     def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
         from marl_airhockey.pixels import small_picture

@@ -1,7 +1,8 @@
-"""Judges a step of B worlds: memory, reward terms, ends and counters, in one loop."""
+"""Judges a step of B worlds and shows what came of it, in one loop over the worlds."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from typing import NamedTuple
 
@@ -24,6 +25,12 @@ class Verdict(NamedTuple):
     outcome: dict[str, Array]
     """``reward`` (B, seats), ``terminated``, ``truncated`` (B,), and ``sent``
     (B, seats, 2) as fractions of top speed in ego frames, float32"""
+    shown: dict[str, Array]
+    """What every seat sees of the state as it is; see `observer.Observer.show`"""
+
+
+Show = Callable[[State, Memory], Sink]
+"""What is shown of a state and a memory, to every seat."""
 
 
 class Referee:
@@ -32,10 +39,11 @@ class Referee:
     Args:
         scenario: whose rules.
         rotations: (S, 2, 2) from the table frame to each seat's ego frame.
+        show: shows the new state, in the same loop.
     """
 
-    def __init__(self, scenario: Scenario, rotations: Array) -> None:
-        self._scenario = scenario
+    def __init__(self, scenario: Scenario, rotations: Array, show: Show) -> None:
+        self._scenario, self._show = scenario, show
         self._rotations = rotations
         self._straight = bool((rotations == np.eye(2)).all())
         self._fused = Fused(self._judge, f"the judging of {scenario.name!r}")
@@ -108,4 +116,4 @@ class Referee:
             "truncated": (cycles >= action["limit"]) & ~terminated,
             "sent": share.astype(np.float32),
         }
-        return new, terms, counters, outcome
+        return new, terms, counters, outcome, self._show(after, new)

@@ -144,18 +144,11 @@ class State:
         extra = {name: change(value) for name, value in self.extra.items()}
         return replace(self, **arrays, extra=extra)
 
-    def moved(
-        self,
-        position: Array,
-        velocity: Array,
-        time: Array,
-        path: Array | None,
-    ) -> State:
-        """A state with another motion and all else shared; cheaper than `replace`."""
+    def having(self, fields: Mapping[str, Any]) -> State:
+        """A state with some fields anew and all else shared; cheaper than `replace`."""
         new = object.__new__(State)
         new.__dict__.update(self.__dict__)
-        new.__dict__["position"], new.__dict__["velocity"] = position, velocity
-        new.__dict__["time"], new.__dict__["path"] = time, path
+        new.__dict__.update(fields)
         return new
 
     def write(self, worlds: Array, rows: State, shared: State) -> State:
@@ -164,7 +157,7 @@ class State:
         Its own arrays are changed in place; one that it shares with ``shared`` is
         copied first, if it has to change.
         """
-        new = self.moved(self.position, self.velocity, self.time, None)
+        new = self.having({"path": None})
         for name in ARRAYS:
             array, value = getattr(self, name), getattr(rows, name)
             if array is getattr(shared, name):

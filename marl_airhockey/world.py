@@ -63,9 +63,9 @@ class World:
         self._parking[:, :2] = -table.normals[sides] * behind[:, None]
         owners = [sides.index(m.side) if m.side in sides else -1 for m in cast.mouths]
         self._owner = np.array(owners, np.int64)
-        self.referee = Referee(scenario, self.reach.turn)
         self.sensor = Sensor(cast, b, physics, dt)
         self.observer = Observer(scenario, self.sensor, physics, observe)
+        self.referee = Referee(scenario, self.reach.turn, self.observer.show)
         self.driven = [
             Driven(seat, driver, self.observer, b, dt)
             for seat, driver in sorted(drivers.items())
@@ -215,7 +215,7 @@ class World:
         vars(self.episode).update(verdict.counters)
         self.state, self.memory = after, verdict.memory
         result = self._report(verdict, excess)
-        self._go_on(result)
+        self._go_on(result, verdict.shown)
         return result
 
     def _ask(self, actions: Array) -> tuple[Array, Array | None]:
@@ -271,7 +271,7 @@ class World:
             first_shot=episode.first_shot,
         )
 
-    def _go_on(self, result: Step) -> None:
+    def _go_on(self, result: Step, shown: dict[str, Array]) -> None:
         """Serve again inside episodes, sense, and restart the worlds that ended."""
         self.sensed = self._look()
         served = self.scenario.restart(self._streams["serve"], self.state, self.memory)
@@ -284,7 +284,10 @@ class World:
                 memory = {k: v[live] for k, v in memory.items()}
             self._place(worlds, rows, memory)
             self.sensed = self._look(worlds)
-        result.observation = self.observation()
+        if shown and served is None:
+            result.observation = self.observer.take(shown, self.open)
+        else:
+            result.observation = self.observation()
         if not self.autoreset:
             return
         worlds = np.flatnonzero(done)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from marl_airhockey.backend import Backend, Command
-from marl_airhockey.batch import LAWS, Batch, Events, Ground, Last, Motion, Order, laws
+from marl_airhockey.batch import LAWS, Ground, laws
 from marl_airhockey.cast import Cast
 from marl_airhockey.kernel import advance
 from marl_airhockey.pool import Pool
@@ -72,31 +72,37 @@ class Batched(Backend):
         self._push[worlds] = 0.0
 
     @staticmethod
-    def _rows(state: State) -> Last:
-        return Last(state.position, state.velocity, state.touching, state.time)
+    def _rows(state: State) -> tuple[Array, ...]:
+        return state.position, state.velocity, state.touching, state.time
 
     def step(self, command: Command) -> State:
-        last = self._last
-        position, velocity, time, *happened = self._pool.take(self.num_worlds)
+        results = self._pool.take(self.num_worlds)
+        position, velocity, time, *happened = results
         path = np.empty(self._path_shape)
         shut = self._open if command.shut is None else command.shut
-        order = Order(*self._follow(command, last.position), shut)
-        motion = Motion(position, velocity, path, self._push, time)
-        events = Events(*(*happened, self._leaning, self._out))
-        batch = Batch(self._ground, self._laws, order, last, motion, events)
-        if spreads(self.num_worlds):
-            over_rows(lambda rows: advance(batch.rows(rows)), self.num_worlds)
-        else:
-            advance(batch)
-        if command.told is not None:
-            told = order.told
-            velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
-        self._last = Last(position, velocity, events.touching, time)
-        new = self.quiet.moved(
-            position, velocity, time, path if self.cast.path else None
+        goal, told, lifted = self._follow(command, self._last[0])
+        arrays = (
+            *(self._laws, goal, told, lifted, shut),
+            *self._last,
+            *(position, velocity, path, self._push, time),
+            *(*happened, self._leaning, self._out),
         )
-        vars(new).update(zip(EVENTS, happened, strict=True))
-        return new
+        if spreads(self.num_worlds):
+
+            def work(rows: slice) -> None:
+                advance(*self._ground, *[array[rows] for array in arrays])
+
+            over_rows(work, self.num_worlds)
+        else:
+            advance(*self._ground, *arrays)
+        if command.told is not None:
+            velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
+        moved: dict[str, Any] = dict(zip(RESULTS, results, strict=True))
+        if self.cast.path:
+            moved["path"] = path
+        state = self.quiet.having(moved)
+        self._last = self._rows(state)
+        return state
 
 
 make = Batched

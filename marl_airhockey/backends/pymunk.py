@@ -69,11 +69,11 @@ class Pymunk(Backend):
             hands = goal[i], told[i], lifted[i]
             self._finish(i, *hands, position[i], velocity[i], path[i])
         time = old.time + self.control_dt
+        moved = {"position": position, "velocity": velocity, "time": time}
         if self.cast.path:
             path[..., 2] += self._kicks[:, None, : path.shape[2]]
-        new = self.quiet.moved(
-            position, velocity, time, path if self.cast.path else None
-        )
+            moved["path"] = path
+        new = self.quiet.having(moved)
         if self._eventful:
             new = self._with_events(new, self._eventful)
         if command.told is not None:
