@@ -29,6 +29,10 @@ Dicts = tuple[
 ]
 
 
+CONSTRAINTS = tuple(enumerate(EXCESS[:-1]))
+"""The limits, and where their excess stands; the last is the cost."""
+
+
 class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """One world of a scenario; the open seats are the agents, ``paddle_0`` and so on.
 
@@ -147,12 +151,11 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
                 return {}, {}, {}, {}, {}
             raise RuntimeError("step: call reset() first; no episode is running")
         result = self.world.step(self._array(actions))
-        agents = self.agents
+        agents, reward = self.agents, result.reward
         terminated, truncated = result.terminated.item(0), result.truncated.item(0)
-        rewards = result.reward[0].tolist()
         outcome = (
             self._dict(result.observation),
-            dict(zip(agents, rewards, strict=True)),
+            {agent: reward.item(i) for i, agent in enumerate(agents)},
             dict.fromkeys(agents, terminated),
             dict.fromkeys(agents, truncated),
             {agent: self._info(result, i) for i, agent in enumerate(agents)},
@@ -186,22 +189,19 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         return array
 
     def _dict(self, observation: Any) -> dict[str, Any]:
+        agents = enumerate(self.possible_agents)
         if isinstance(observation, dict):
-            return {
-                agent: {k: v[0, i] for k, v in observation.items()}
-                for i, agent in enumerate(self.possible_agents)
-            }
-        return dict(zip(self.possible_agents, observation[0], strict=True))
+            return {a: {k: v[0, i] for k, v in observation.items()} for i, a in agents}
+        return {a: observation[0, i] for i, a in agents}
 
     def _info(self, result: Step, i: int) -> dict[str, Any]:
-        seat = self.world.open[i]
-        *over, cost = result.excess[0, seat].tolist()
+        excess = result.excess[0, self.world.open[i]].tolist()
         return {
             "reward": {k: v.item(i) for k, v in result.terms.items()},
             "sent": result.sent[0, i],
             "success": result.success.item(i),
-            "constraints": dict(zip(EXCESS, over, strict=False)),
-            "cost": cost,
+            "constraints": {name: excess[k] for k, name in CONSTRAINTS},
+            "cost": excess[-1],
         }
 
     def state(self) -> Array:

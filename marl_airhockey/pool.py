@@ -27,11 +27,12 @@ class Pool:
 
     def take(self, rows: int) -> tuple[Array, ...]:
         """One array of each kind, with so many rows."""
+        waiting = self._waiting.get(rows)
+        if waiting:
+            return waiting.pop()
         if rows >= ROWS or not self._kinds:
             return tuple(np.empty((rows, *shape), kind) for shape, kind in self._kinds)
-        waiting = self._waiting.setdefault(rows, [])
-        if not waiting:
-            calls = ROWS // max(rows, 1)
-            blocks = [np.empty((calls, rows, *s), kind) for s, kind in self._kinds]
-            waiting += zip(*blocks, strict=True)
+        calls = ROWS // max(rows, 1)
+        blocks = [np.empty((calls, rows, *s), kind) for s, kind in self._kinds]
+        self._waiting[rows] = waiting = list(zip(*blocks, strict=True))
         return waiting.pop()

@@ -275,10 +275,9 @@ class World:
         """Serve again inside episodes, sense, and restart the worlds that ended."""
         self.sensed = self._look()
         served = self.scenario.restart(self._streams["serve"], self.state, self.memory)
-        done = result.terminated | result.truncated
         if served is not None:
             worlds, rows, memory = served
-            live = ~done[worlds]
+            live = ~(result.terminated | result.truncated)[worlds]
             if not live.all():
                 worlds, rows = worlds[live], rows.map(lambda x: x[live])
                 memory = {k: v[live] for k, v in memory.items()}
@@ -290,7 +289,7 @@ class World:
             result.observation = self.observation()
         if not self.autoreset:
             return
-        worlds = np.flatnonzero(done)
+        worlds = np.flatnonzero(result.terminated | result.truncated)
         if len(worlds):
             result.final_observation = result.observation
             self.restart(worlds)

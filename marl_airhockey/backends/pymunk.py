@@ -60,9 +60,10 @@ class Pymunk(Backend):
         if command.told is not None:
             self._lift(lifted, True)
         shut = self._open if command.shut is None else command.shut
-        for i in np.flatnonzero((shut != self._shut).any(-1)).tolist():
-            self.spaces[i].shut(shut[i])
-        self._shut = shut
+        if shut is not self._shut:
+            for i in np.flatnonzero((shut != self._shut).any(-1)).tolist():
+                self.spaces[i].shut(shut[i])
+            self._shut = shut
         for i in self._eventful:
             self.spaces[i].begin()
         for i in self._drift(goal, told, lifted, position, velocity, path):
@@ -147,7 +148,7 @@ class Pymunk(Backend):
             for k, place in space.out.items():
                 state.position[i, puck + k] = place
                 state.velocity[i, puck + k] = 0.0
-        return replace(state, **arrays)
+        return state.having(arrays)
 
     def _lift(self, lifted: Array, up: bool) -> None:
         for i, k in zip(*np.nonzero(lifted), strict=True):
