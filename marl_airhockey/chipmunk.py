@@ -1,26 +1,28 @@
 """Chipmunk's own step driven from compiled code: most substeps need no Python.
 
 A paddle's velocity is set and the space is stepped, substep by substep, until something
-touches; from there Python goes on. The functions are called by their addresses. A
-vector of two doubles passed by value takes the place of two double arguments on Unix
-(x86-64 and ARM64); elsewhere, or if a check at import fails, `AVAILABLE` is False.
+touches; from there Python goes on. A vector of two doubles passed by value takes the
+place of two double arguments on Unix (x86-64 and ARM64); elsewhere, or if a check at
+import fails, `AVAILABLE` is False.
 """
 
 from __future__ import annotations
 
-import ctypes
 import os
 from typing import Any
 
+import llvmlite.binding as llvm
 import numpy as np
 import pymunk
 import pymunk.batch
-from numba import njit
+from numba import njit, types
 from pymunk._chipmunk_cffi import ffi, lib
 
 from marl_airhockey.paddles import drive
 from marl_airhockey.state import Array
 
+READS = 6
+"""Addresses of a space before those of its paddles."""
 EVENT, SUBSTEP = 0, 1
 """Columns of the flags: whether anything touches, and the substep that is running."""
 
@@ -31,25 +33,22 @@ def address(thing: Any) -> int:
 
 
 def _function(name: str, *arguments: Any) -> Any:
-    kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *arguments)
-    return kind(address(ffi.addressof(lib, name)))
+    # By a name of its own, which compiled code that is kept can find again.
+    own = f"marl_airhockey_{name}"
+    llvm.add_symbol(own, address(ffi.addressof(lib, name)))
+    return types.ExternalFunction(own, types.void(types.intp, *arguments))
 
 
-_set_velocity = _function("cpBodySetVelocity", ctypes.c_double, ctypes.c_double)
-_set_position = _function("cpBodySetPosition", ctypes.c_double, ctypes.c_double)
-_advance = _function("cpSpaceStep", ctypes.c_double)
-
-_each = _function("cpSpaceEachBody", ctypes.c_void_p, ctypes.c_void_p)
-_gather = address(ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched"))
-_libc = ctypes.CDLL(None if os.name == "posix" else "msvcrt")
-_copy = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)(
-    ctypes.cast(_libc.memcpy, ctypes.c_void_p).value or 0
-)
+_p, _number = types.intp, types.float64
+_set_velocity = _function("cpBodySetVelocity", _number, _number)
+_set_position = _function("cpBodySetPosition", _number, _number)
+_advance = _function("cpSpaceStep", _number)
+_each = _function("cpSpaceEachBody", _p, _p)
+_copy: Any = types.ExternalFunction("memcpy", types.void(_p, _p, _p))
 _zero = np.zeros(1, np.int64)
-_nothing = _zero.ctypes.data
 
 
-@njit(cache=False)
+@njit(cache=True)
 def drift(
     worlds: Array,
     goal: Array,
@@ -67,7 +66,7 @@ def drift(
     """Step quiet worlds until the end or the first event.
 
     Args:
-        worlds: (B, 4 + paddles) addresses: the space, its `Reader`'s three, the
+        worlds: (B, 6 + paddles) addresses: the space, its `Reader`'s five, the
             paddles' bodies.
         goal: (B, paddles, 2) velocity at the end, m/s; the ramp to it is linear.
         told: (B, paddles) moves at its goal all along and does not yield.
@@ -110,7 +109,7 @@ def drift(
                     mean,
                 )
                 for i in range(paddles):
-                    body, vx, vy = worlds[b, 4 + i], mean[i, 0], mean[i, 1]
+                    body, vx, vy = worlds[b, READS + i], mean[i, 0], mean[i, 1]
                     _set_velocity(body, vx, vy)
                     if met:
                         x, y = hands[i, 0] - vx * dt, hands[i, 1] - vy * dt
@@ -132,10 +131,10 @@ def drift(
     return left
 
 
-@njit(cache=False)
+@njit(cache=True)
 def _record(world: Array, rows: Array) -> None:
-    _copy(world[2], _nothing, 4)
-    _each(world[0], _gather, world[1])
+    _copy(world[2], world[5], 4)
+    _each(world[0], world[4], world[1])
     _copy(rows.ctypes.data, world[3], rows.size * 8)
 
 
@@ -163,8 +162,11 @@ class Reader:
             address(self._data),
             address(ffi.addressof(array[0], "num")),
             address(array.arr),
+            address(self._each),
+            _zero.ctypes.data,
         )
-        """Of the struct, of its count of numbers, and of the numbers."""
+        """Of the struct, of its count of numbers, of the numbers, of what fills it for
+        a body, and of a zero."""
 
     def __call__(self) -> Array:
         """(bodies, 4) x, y, vx, vy; the same memory at every call."""
@@ -173,11 +175,16 @@ class Reader:
         return self._rows
 
 
+@njit(cache=True)
+def _try(body: int, vx: float, vy: float) -> None:
+    _set_velocity(body, vx, vy)
+
+
 def _works() -> bool:
     if os.name != "posix":
         return False
     body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-    _set_velocity(address(body._body), 0.25, -0.75)
+    _try(address(body._body), 0.25, -0.75)
     return tuple(body.velocity) == (0.25, -0.75)
 
 
