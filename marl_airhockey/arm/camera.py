@@ -26,7 +26,8 @@ class Camera:
     """
 
     def __init__(self, model: Any, place: Place, width: int, height: int) -> None:
-        self._place = place
+        self._place, self._model = place, model
+        self._data = mujoco.MjData(model)
         # The largest picture that the model's own buffer holds.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, height)
@@ -43,9 +44,11 @@ class Camera:
         self._option.geomgroup[1] = 1
         self._option.sitegroup[:] = 0
 
-    def picture(self, data: Any, name: str, marks: Sequence[Mark] = ()) -> Array:
-        """(H, W, 3) uint8 of what a camera sees, and a scenario's marks."""
-        self._renderer.update_scene(data, name, self._option)
+    def picture(self, places: Array, name: str, marks: Sequence[Mark] = ()) -> Array:
+        """(H, W, 3) uint8 of what a camera sees at qpos, and a scenario's marks."""
+        self._data.qpos[:] = places
+        mujoco.mj_fwdPosition(self._model, self._data)
+        self._renderer.update_scene(self._data, name, self._option)
         for mark in marks:
             self._draw(mark)
         return np.asarray(self._renderer.render())

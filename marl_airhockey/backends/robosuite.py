@@ -83,9 +83,9 @@ class Robosuite(Backend):
         self._dt = control_dt / substeps
         env: Any = AirHockey(cast=cast, timestep=self._dt, control_freq=1 / control_dt)
         env.reset()
-        model, data = env.sim.model._model, env.sim.data._data
+        model, data = env.lean_model(), env.sim.data._data
         self.env = env
-        """The robosuite environment whose model the worlds share."""
+        """The robosuite environment whose model all worlds copy."""
         place, mouths = env.place, cast.mouths
         self._table = Table(
             origin=place.origin,
@@ -109,7 +109,7 @@ class Robosuite(Backend):
         ]
         self._old = np.zeros((num_worlds, len(cast.seats), 2))
         self.state = self.quiet
-        self._cameras: dict[tuple[int, int], Camera] = {}
+        self._cameras: dict[int, Camera] = {}
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         for i in worlds.tolist():
@@ -180,11 +180,11 @@ class Robosuite(Backend):
     ) -> Array:
         from marl_airhockey.arm.camera import Camera
 
-        arms, key = self.worlds[world], (world, width)
-        if key not in self._cameras:
-            height = round(width * 0.6)
-            self._cameras[key] = Camera(arms.model, self.env.place, width, height)
-        return self._cameras[key].picture(arms.data, camera, marks)
+        if width not in self._cameras:
+            model, height = self.env.sim.model._model, round(width * 0.6)
+            self._cameras[width] = Camera(model, self.env.place, width, height)
+        places = self.worlds[world].data.qpos
+        return self._cameras[width].picture(places, camera, marks)
 
     def close(self) -> None:
         for camera in self._cameras.values():
