@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from marl_airhockey.cast import Cast
-from marl_airhockey.state import Array, State, still_state
+from marl_airhockey.chain import Stage
+from marl_airhockey.state import RESULTS, Array, State, still_state
 
 if TYPE_CHECKING:
     from marl_airhockey.scenario import Mark
@@ -101,6 +102,36 @@ class Backend(ABC):
         way /= self.control_dt
         lifted = told & (np.hypot(way[..., 0], way[..., 1]) > TOLD_SPEED)
         return np.where(told[..., None], way, command.velocity), told, lifted
+
+    def blank(self) -> State:
+        """A state with arrays of its own, of any content, of what steps change."""
+        fields: dict[str, Array] = {
+            name: np.empty_like(getattr(self.quiet, name)) for name in RESULTS
+        }
+        if self.cast.path:
+            fields["path"] = np.empty(self._path_shape)
+        return self.quiet.having(fields)
+
+    def stage(self, goal: Array, before: State, after: State) -> Stage:
+        """A step from one state that stays into another, for a chain.
+
+        Args:
+            goal: (B, seats, 2) m/s, where all ask.
+            before: the step.
+            after: the step; its motion and events are filled.
+
+        Raises:
+            TypeError: a step is not one compiled function.
+        """
+        raise TypeError(f"{type(self).__name__} has no compiled step")
+
+    def begin(self) -> None:
+        """What is to be done before a stage."""
+        return None
+
+    def finish(self, goal: Array, after: State) -> None:
+        """What is left to be done after a stage: the worlds are in ``after`` now."""
+        return None
 
     def photograph(
         self, world: int, camera: str, marks: Sequence[Mark], width: int

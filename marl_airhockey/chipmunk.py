@@ -132,6 +132,65 @@ def drift(
 
 
 @njit(cache=True)
+def step_quiet(
+    old_position: Array,
+    old_velocity: Array,
+    old_time: Array,
+    worlds: Array,
+    goal: Array,
+    told: Array,
+    lifted: Array,
+    kicks: Array,
+    control_dt: float,
+    substeps: int,
+    diameter: float,
+    flags: Array,
+    path: Array,
+    position: Array,
+    velocity: Array,
+    time: Array,
+    touched: Array,
+    touched_at: Array,
+    touching: Array,
+    crossed: Array,
+    crossed_velocity: Array,
+    left: Array,
+) -> None:
+    """A control step by `drift` into arrays of its results, as if nothing happened.
+
+    ``left`` (1,) is the number of worlds that Python must go on with; the others are as
+    those of `drift` and of a `State`.
+    """
+    for b in range(len(worlds)):
+        time[b] = old_time[b] + control_dt
+        for i in range(position.shape[1]):
+            for axis in range(2):
+                position[b, i, axis] = old_position[b, i, axis]
+                velocity[b, i, axis] = old_velocity[b, i, axis]
+        for k in range(touched.shape[2]):
+            for i in range(touched.shape[1]):
+                touched[b, i, k], touched_at[b, i, k] = 0, np.nan
+                touching[b, i, k] = False
+            for m in range(crossed.shape[2]):
+                crossed[b, k, m] = False
+                crossed_velocity[b, k, m, 0] = crossed_velocity[b, k, m, 1] = 0.0
+    left[0] = drift(
+        worlds,
+        goal,
+        told,
+        lifted,
+        kicks,
+        control_dt / substeps,
+        substeps,
+        diameter,
+        flags,
+        position,
+        velocity,
+        path,
+    )
+
+
+@njit(cache=True)
 def _record(world: Array, rows: Array) -> None:
     _copy(world[2], world[5], 4)
     _each(world[0], world[4], world[1])

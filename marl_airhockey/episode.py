@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, field
 
 from marl_airhockey.observer import Observation
@@ -53,3 +54,9 @@ class Episode:
     """(B,) latched"""
     physics: dict[str, Array] = field(default_factory=dict)
     """Physical parameters, (B,) each"""
+
+    def counted(self, counters: dict[str, Array]) -> Episode:
+        """The same with other counters."""
+        new = copy(self)
+        vars(new).update(counters)
+        return new

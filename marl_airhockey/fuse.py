@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.loops import Writer, load
+from marl_airhockey.chain import Stage
+from marl_airhockey.loops import Call, Writer, load
 from marl_airhockey.pool import Pool
 from marl_airhockey.state import Array
 from marl_airhockey.symbols import Tape
@@ -64,6 +65,16 @@ class Fused:
         # Copies, as numpy may have handed on what it was given.
         return tuple({k: np.array(v) for k, v in sink.items()} for sink in plain)
 
+    def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
+        """The compiled loop from sources into sinks that it once gave, for a chain.
+
+        Raises:
+            TypeError: there is none for such arrays.
+        """
+        if self._plan is None:
+            raise TypeError(f"{self._name} is not compiled")
+        return self._plan.stage(sources, sinks)
+
     def _refuse(self, error: Exception) -> None:
         self.refused = f"{type(error).__name__}: {error}"
         warnings.warn(
@@ -102,7 +113,10 @@ class _Plan:
                 writer.store(key, place, dtype)
                 kinds.append((shape, dtype))
         self._count = next(iter(arrays))
-        self._kernel, self._call = load(writer.source(len(sources)))
+        loaded = load(writer.source(len(sources)))
+        self._kernel = loaded.kernel
+        self._call: Call = loaded.module.call
+        self._inputs = list(writer.inputs)
         self._kinds = [arrays[name].dtype for name in writer.inputs]
         self._kinds += [dtype for _, dtype in kinds]
         self._pool = Pool(kinds)
@@ -123,6 +137,15 @@ class _Plan:
         except TypeError:
             self._copied = True
             return self._call(self._copying, outputs, *sources)
+
+    def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
+        """See `Fused.stage`."""
+        given = [sources[i][key] for i, key in self._inputs]
+        outputs = [array for sink in sinks for array in sink.values()]
+        kinds = [array.dtype for array in (*given, *outputs)]
+        if kinds != self._kinds:
+            raise TypeError(f"arrays are {kinds}, the loop is for {self._kinds}")
+        return Stage(self._kernel, (*given, *outputs))
 
     def _copying(self, *arrays: Array) -> None:
         """The loop, on copies where need be; TypeError where a number would suffer."""

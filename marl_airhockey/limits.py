@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from marl_airhockey.chain import Fixed, Stage
 from marl_airhockey.state import Array
 from marl_airhockey.table import Seat, Table, half_planes, reaches
 
@@ -63,10 +64,19 @@ class Sent(NamedTuple):
     """(B, S, 5) by how much the asked velocity went beyond each limit, zero if not: see
     `EXCESS`"""
 
+    @staticmethod
+    def blank(asked: Array) -> Sent:
+        """Arrays of any content for what is asked, (B, S, 2)."""
+        excess = np.empty((*asked.shape[:-1], len(EXCESS)))
+        return Sent(np.empty(asked.shape), np.empty(asked.shape), excess)
+
 
 EXCESS = ("speed", "acceleration", "jerk", "reach", "cost")
 """Of the asked velocity: m/s, m/s2, m/s3, m/s taken off toward an edge of the reach,
 and all of them in units of their limits, summed."""
+
+
+INFINITE = "action: every element must be finite, got nan or inf"
 
 
 def limits(
@@ -94,8 +104,7 @@ def limits(
     Raises:
         ValueError: an asked velocity that is not finite.
     """
-    sent, push = np.empty(asked.shape), np.empty(asked.shape)
-    excess = np.empty((*asked.shape[:-1], len(EXCESS)))
+    sent = Sent.blank(asked)
     finite = _filter(
         asked,
         position,
@@ -109,13 +118,36 @@ def limits(
         speed,
         acceleration,
         dt,
-        sent,
-        push,
-        excess,
+        *sent,
     )
     if not finite:
-        raise ValueError("action: every element must be finite, got nan or inf")
-    return Sent(sent, push, excess)
+        raise ValueError(INFINITE)
+    return sent
+
+
+def limits_stage(
+    asked: Array,
+    position: Array,
+    velocity: Array,
+    pushed: Array,
+    reach: Reach,
+    speed: Array,
+    acceleration: Array,
+    dt: float,
+    sent: Sent,
+) -> Stage:
+    """The same from and into arrays that stay; it stops where it would raise."""
+    shared = (reach.normals, reach.offsets, reach.share, reach.turn)
+    return Stage(
+        _filter,
+        (
+            *(asked, position, velocity, pushed),
+            *map(Fixed, shared),
+            *(reach.passes, speed, acceleration, dt),
+            *sent,
+        ),
+        stops=True,
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -13,7 +13,8 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -41,7 +42,7 @@ INFIX = {
     "bitwise_or": "|",
 }
 """Operations that numba compiles faster as operators."""
-_loaded: dict[str, tuple[Callable[..., None], Call]] = {}
+_loaded: dict[str, Loaded] = {}
 
 
 class Writer:
@@ -157,8 +158,21 @@ def _type(dtype: Any, axes: int) -> str:
     return f"{name}[{':, ' * (axes - 1)}::1]"
 
 
-def load(source: str) -> tuple[Callable[..., None], Call]:
-    """The compiled loop of a module and what calls it."""
+class Loaded(NamedTuple):
+    """A written module."""
+
+    kernel: Callable[..., Any]
+    """Compiled"""
+    module: ModuleType
+
+
+def load(source: str, names: Mapping[str, Any] | None = None) -> Loaded:
+    """Have numba compile a module's ``kernel`` for its ``SIGNATURE``.
+
+    Args:
+        source: of the module.
+        names: what it finds under these names besides.
+    """
     digest = hashlib.sha256(source.encode()).hexdigest()[:24]
     if digest not in _loaded:
         path = cache_folder() / f"loop_{digest}.py"
@@ -173,8 +187,9 @@ def load(source: str) -> tuple[Callable[..., None], Call]:
         # Where numba looks when it loads a compiled loop of another day.
         sys.modules[path.stem] = module
         spec.loader.exec_module(module)
+        vars(module).update(names or {})
         compiled = njit(module.SIGNATURE, cache=True, nogil=True, error_model="numpy")
-        _loaded[digest] = compiled(module.kernel), module.call
+        _loaded[digest] = Loaded(compiled(module.kernel), module)
     return _loaded[digest]
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.chain import Stage
 from marl_airhockey.episode import Episode
 from marl_airhockey.fuse import Fused, Sink, Source
 from marl_airhockey.scenario import Scenario
@@ -72,11 +73,27 @@ class Referee:
             episode: its counters before the step.
             limit: (B,) control steps after which the clock ends an episode.
         """
-        action = {"sent": sent, "limit": limit}
-        parts = self._fused(
-            vars(before), vars(after), memory, vars(episode), episode.physics, action
+        return Verdict(
+            *self._fused(*_sources(before, sent, after, memory, episode, limit))
         )
-        return Verdict(*parts)
+
+    def stage(
+        self,
+        before: State,
+        sent: Array,
+        after: State,
+        memory: Memory,
+        episode: Episode,
+        limit: Array,
+        verdict: Verdict,
+    ) -> Stage:
+        """The same from and into arrays that stay, the last being those of a verdict.
+
+        Raises:
+            TypeError: the rules are not compiled for such arrays.
+        """
+        sources = _sources(before, sent, after, memory, episode, limit)
+        return self._fused.stage(sources, verdict)
 
     def _judge(
         self,
@@ -117,3 +134,22 @@ class Referee:
             "sent": share.astype(np.float32),
         }
         return new, terms, counters, outcome, self._show(after, new)
+
+
+def _sources(
+    before: State,
+    sent: Array,
+    after: State,
+    memory: Memory,
+    episode: Episode,
+    limit: Array,
+) -> tuple[Source, ...]:
+    action = {"sent": sent, "limit": limit}
+    return (
+        vars(before),
+        vars(after),
+        memory,
+        vars(episode),
+        episode.physics,
+        action,
+    )

@@ -176,6 +176,8 @@ ARRAYS = tuple(
 
 EVENTS = ("touched", "touched_at", "touching", "crossed", "crossed_velocity")
 """The arrays that tell what happened in a step."""
+RESULTS = ("position", "velocity", "time", *EVENTS)
+"""The arrays that every step of every backend makes anew."""
 
 
 def still_state(bodies: Bodies, worlds: int, mouths: int) -> State:

@@ -13,7 +13,7 @@ from marl_airhockey.backend import Backend, Command
 from marl_airhockey.draws import Draws
 from marl_airhockey.driver import Driver
 from marl_airhockey.episode import Episode, Step
-from marl_airhockey.limits import Reach, limits
+from marl_airhockey.limits import Reach, Sent, limits
 from marl_airhockey.observer import Observation, Observer
 from marl_airhockey.physics import Physics
 from marl_airhockey.referee import Referee, Verdict
@@ -21,6 +21,11 @@ from marl_airhockey.scenario import Scenario
 from marl_airhockey.seats import Driven
 from marl_airhockey.sensor import Delay, Sensor
 from marl_airhockey.state import Array, Memory, State, still_state
+from marl_airhockey.threads import spreads
+from marl_airhockey.turn import Turn
+
+PATIENCE = 50
+"""Steps after which it is worth while to have a step compiled as a whole."""
 
 
 class World:
@@ -84,12 +89,19 @@ class World:
         self._streams: dict[str, Draws] = {}
         for purpose in ("start", "physics", "sensor", "serve"):
             self._streams[purpose] = Draws.keyed(self.seeds, self.seeds, purpose)
-        self.state: State = still_state(cast.bodies, b, len(cast.mouths))
-        self.memory: Memory = {}
+        self.state = still_state(cast.bodies, b, len(cast.mouths))
+        self.memory = {}
         self.sensed = self.state
         self._pushed = np.zeros((b, n, 2))
         self.asked, self.sent = np.zeros((2, b, n, 2))
+        self._steps = 0
+        self._turn: Turn | None = None
 
+    state: State
+    """As it is, table frame. Its arrays, and those of ``memory``, ``episode`` and
+    ``sent``, are overwritten by the step after the next: copy what is to stay."""
+    memory: Memory
+    """What the scenario remembers of the episode"""
     seeds: Array
     """(B,) of each world"""
     sensed: State
@@ -144,8 +156,10 @@ class World:
             self.backend.set_physics(episode.physics, worlds)
         draws = self._streams["start"].select(worlds)
         self._place(worlds, *self.scenario.start(draws, len(worlds)))
-        for name in ("cycles", "returns", "success", "first_shot"):
-            setattr(episode, name, _merged(getattr(episode, name), worlds, 0))
+        for array in (episode.cycles, episode.returns):
+            array[worlds] = 0
+        for array in (episode.success, episode.first_shot):
+            array[worlds] = False
         self._pushed[worlds] = 0.0
         if self._delay is not None:
             idle = np.zeros((len(worlds), self._delay.depth, *self._pushed.shape[1:]))
@@ -194,7 +208,25 @@ class World:
         if self._delay is not None:
             asked = self._delay.push(asked, values["action_delay"])
         self.asked = asked
-        sent, self._pushed, excess = limits(
+        if self._turn is None or told is not None or shut is not None:
+            after, sent, verdict = self._by_parts(asked, told, shut)
+        else:
+            after, sent, verdict = self._turn(
+                asked, before, self.memory, self.episode, self._pushed
+            )
+        self.sent, self._pushed = sent.velocity, sent.pushed
+        vars(self.episode).update(verdict.counters)
+        self.state, self.memory = after, verdict.memory
+        result = self._report(verdict, sent.excess)
+        self._go_on(result, verdict.shown)
+        return result
+
+    def _by_parts(
+        self, asked: Array, told: Array | None, shut: Array | None
+    ) -> tuple[State, Sent, Verdict]:
+        """Limits, physics and judging of a step, one after the other."""
+        values, before = self.episode.physics, self.state
+        sent = limits(
             asked,
             before.position,
             before.velocity,
@@ -205,18 +237,34 @@ class World:
             self.control_dt,
         )
         if told is not None:
-            np.copyto(sent, told[..., 2:], where=np.isfinite(told[..., 2:]))
-            self._pushed = (sent - before.paddle_velocity) / self.control_dt
-        self.sent = sent
-        after = self.backend.step(Command(sent, told, shut))
+            known = np.isfinite(told[..., 2:])
+            np.copyto(sent.velocity, told[..., 2:], where=known)
+            pushed = (sent.velocity - before.paddle_velocity) / self.control_dt
+            sent = sent._replace(pushed=pushed)
+        after = self.backend.step(Command(sent.velocity, told, shut))
         verdict = self.referee.judge(
-            before, sent, after, self.memory, self.episode, self._limit
+            before, sent.velocity, after, self.memory, self.episode, self._limit
         )
-        vars(self.episode).update(verdict.counters)
-        self.state, self.memory = after, verdict.memory
-        result = self._report(verdict, excess)
-        self._go_on(result, verdict.shown)
-        return result
+        self._steps += 1
+        if self._steps == PATIENCE and not spreads(self.num_worlds):
+            self._turn = self._compiled(after, verdict)
+        return after, sent, verdict
+
+    def _compiled(self, state: State, verdict: Verdict) -> Turn | None:
+        """Steps like the last one as one compiled call, if that can be."""
+        episode = self.episode.counted(verdict.counters)
+        try:
+            return Turn(
+                self.backend,
+                self.referee,
+                self.reach,
+                self._limit,
+                state,
+                verdict.memory,
+                episode,
+            )
+        except TypeError:
+            return None
 
     def _ask(self, actions: Array) -> tuple[Array, Array | None]:
         """What every seat asks, (B, seats, 2) ego fractions, and what some tell."""
@@ -253,7 +301,7 @@ class World:
     def _report(self, verdict: Verdict, excess: Array) -> Step:
         outcome, episode, terms = verdict.outcome, self.episode, verdict.terms
         reward, sent, cost = outcome["reward"], outcome["sent"], excess[..., -1]
-        success = episode.success
+        success = episode.success.copy()
         if self.driven:
             rows = (reward, sent, cost, success)
             reward, sent, cost, success = (x[:, self.open] for x in rows)
@@ -268,7 +316,7 @@ class World:
             excess=excess,
             cost=cost,
             success=success,
-            first_shot=episode.first_shot,
+            first_shot=episode.first_shot.copy(),
         )
 
     def _go_on(self, result: Step, shown: dict[str, Array]) -> None:
@@ -312,7 +360,7 @@ class World:
             seat.driver.__exit__(None, None, None)
 
 
-def _merged(array: Array, worlds: Array, rows: Array | int) -> Array:
+def _merged(array: Array, worlds: Array, rows: Array) -> Array:
     """A copy in which some worlds, by index, hold ``rows``."""
     merged = array.copy()
     merged[worlds] = rows

@@ -20,6 +20,7 @@ LAYERS = (
         "versus",
         "tactics",
         "loops",
+        "chain",
         "fuse",
         "threads",
         "handicap",
@@ -37,7 +38,7 @@ LAYERS = (
         "registration",
     },
     {"sensor", "observer", "seats", "roster", "canvas", "pixels", "render", "window"}
-    | {"episode", "referee", "world"},
+    | {"episode", "referee", "turn", "world"},
     {"make", "spaces", "parallel", "single", "vector", "vector_sb3"},
     {
         "charts",

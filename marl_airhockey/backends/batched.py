@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,15 +10,13 @@ import numpy as np
 from marl_airhockey.backend import Backend, Command
 from marl_airhockey.batch import LAWS, Ground, laws
 from marl_airhockey.cast import Cast
+from marl_airhockey.chain import Fixed, Stage
 from marl_airhockey.kernel import advance
 from marl_airhockey.pool import Pool
 from marl_airhockey.rails import sides
-from marl_airhockey.state import EVENTS, Array, State
+from marl_airhockey.state import RESULTS, Array, State
 from marl_airhockey.table import GRAVITY
 from marl_airhockey.threads import over_rows, spreads
-
-RESULTS = ("position", "velocity", "time", *EVENTS)
-"""The arrays of a state that a step makes."""
 
 
 class Batched(Backend):
@@ -77,16 +76,14 @@ class Batched(Backend):
 
     def step(self, command: Command) -> State:
         results = self._pool.take(self.num_worlds)
-        position, velocity, time, *happened = results
+        moved: dict[str, Any] = dict(zip(RESULTS, results, strict=True))
         path = np.empty(self._path_shape)
+        if self.cast.path:
+            moved["path"] = path
+        state = self.quiet.having(moved)
         shut = self._open if command.shut is None else command.shut
-        goal, told, lifted = self._follow(command, self._last[0])
-        arrays = (
-            *(self._laws, goal, told, lifted, shut),
-            *self._last,
-            *(position, velocity, path, self._push, time),
-            *(*happened, self._leaning, self._out),
-        )
+        orders = (*self._follow(command, self._last[0]), shut)
+        arrays = self._arrays(orders, self._last, path, results)
         if spreads(self.num_worlds):
 
             def work(rows: slice) -> None:
@@ -96,13 +93,36 @@ class Batched(Backend):
         else:
             advance(*self._ground, *arrays)
         if command.told is not None:
-            velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
-        moved: dict[str, Any] = dict(zip(RESULTS, results, strict=True))
-        if self.cast.path:
-            moved["path"] = path
-        state = self.quiet.having(moved)
+            told = orders[1]
+            state.velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
         self._last = self._rows(state)
         return state
+
+    def _arrays(
+        self,
+        orders: tuple[Array, ...],
+        last: tuple[Array, ...],
+        path: Array,
+        results: Sequence[Array],
+    ) -> tuple[Array, ...]:
+        """All arrays that `advance` works on, but for those that worlds share."""
+        position, velocity, time, *happened = results
+        return (
+            *(self._laws, *orders, *last),
+            *(position, velocity, path, self._push, time),
+            *(*happened, self._leaning, self._out),
+        )
+
+    def stage(self, goal: Array, before: State, after: State) -> Stage:
+        orders = (goal, self._nobody, self._nobody, self._open)
+        path = after.path if after.path is not None else np.empty(self._path_shape)
+        results = [getattr(after, name) for name in RESULTS]
+        arrays = self._arrays(orders, self._rows(before), path, results)
+        ground = (Fixed(x) if isinstance(x, np.ndarray) else x for x in self._ground)
+        return Stage(advance, (*ground, *arrays))
+
+    def finish(self, goal: Array, after: State) -> None:
+        self._last = self._rows(after)
 
 
 make = Batched

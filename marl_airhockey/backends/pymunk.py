@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from marl_airhockey.backend import Backend, Command
 from marl_airhockey.cast import Cast
-from marl_airhockey.chipmunk import AVAILABLE, EVENT, SUBSTEP, drift, new_flags
+from marl_airhockey.chain import Fixed, Stage
+from marl_airhockey.chipmunk import AVAILABLE, EVENT, SUBSTEP, new_flags, step_quiet
 from marl_airhockey.space import Space
-from marl_airhockey.state import EVENTS, Array, State
+from marl_airhockey.state import EVENTS, RESULTS, Array, State
 
 
 class Pymunk(Backend):
@@ -30,6 +31,8 @@ class Pymunk(Backend):
         self.state = self.quiet
         self._shut = self._open
         self._kicks = np.zeros((num_worlds, len(cast.bodies)))
+        self._pathless = np.empty((num_worlds, 0, cast.bodies.movers, 4))
+        self._left = np.zeros(1, np.int64)
         self._eventful: list[int] = []
         """Worlds in which something touched or crossed at the end of the last step."""
         self._turns = cast.blocks > 0 and cast.block_shape == "square"
@@ -53,67 +56,86 @@ class Pymunk(Backend):
         self._eventful = sorted({*self._eventful, *rows})
 
     def step(self, command: Command) -> State:
-        old = self.state
-        position, velocity = old.position.copy(), old.velocity.copy()
-        path = np.empty(self._path_shape)
-        goal, told, lifted = self._follow(command, position)
+        before, after = self.state, self.blank()
+        goal, told, lifted = self._follow(command, before.position)
         if command.told is not None:
             self._lift(lifted, True)
-        shut = self._open if command.shut is None else command.shut
+        orders = np.ascontiguousarray(goal), told, lifted
+        self.begin(command.shut)
+        if AVAILABLE:
+            step_quiet(*self._arguments(orders, before, after))
+        else:
+            self._leave_all(before, after)
+        self._go_on(orders, after)
+        if command.told is not None:
+            after.velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
+            self._lift(lifted, False)
+        if self._turns:
+            after = self._with_turns(after)
+        self.state = after
+        return after
+
+    def stage(self, goal: Array, before: State, after: State) -> Stage:
+        if self._turns or not AVAILABLE:
+            raise TypeError("steps of squares, and on this system, need Python")
+        orders = goal, self._nobody, self._nobody
+        *arguments, left = self._arguments(orders, before, after)
+        return Stage(step_quiet, (*arguments, Fixed(left)))
+
+    def begin(self, shut: Array | None = None) -> None:
+        shut = self._open if shut is None else shut
         if shut is not self._shut:
             for i in np.flatnonzero((shut != self._shut).any(-1)).tolist():
                 self.spaces[i].shut(shut[i])
             self._shut = shut
         for i in self._eventful:
             self.spaces[i].begin()
-        for i in self._drift(goal, told, lifted, position, velocity, path):
-            hands = goal[i], told[i], lifted[i]
-            self._finish(i, *hands, position[i], velocity[i], path[i])
-        time = old.time + self.control_dt
-        moved = {"position": position, "velocity": velocity, "time": time}
-        if self.cast.path:
-            path[..., 2] += self._kicks[:, None, : path.shape[2]]
-            moved["path"] = path
-        new = self.quiet.having(moved)
-        if self._eventful:
-            new = self._with_events(new, self._eventful)
-        if command.told is not None:
-            new.velocity[:, : told.shape[1]][told] = command.told[told][:, 2:]
-            self._lift(lifted, False)
-        if self._turns:
-            new = self._with_turns(new)
-        self.state = new
-        return new
+        self._eventful = []
 
-    def _drift(
-        self,
-        goal: Array,
-        told: Array,
-        lifted: Array,
-        position: Array,
-        velocity: Array,
-        path: Array,
-    ) -> list[int]:
-        """Step the quiet worlds in compiled code; those that Python must finish."""
-        flags, self._eventful = self._flags, []
-        if not AVAILABLE:
-            flags[:, SUBSTEP] = -1
-            return list(range(self.num_worlds))
-        left = drift(
-            self._worlds,
-            goal,
-            told,
-            lifted,
-            self._kicks,
-            self.control_dt / self.substeps,
-            self.substeps,
-            2 * self.cast.table.paddle_radius,
-            flags,
-            position,
-            velocity,
-            path,
+    def finish(self, goal: Array, after: State) -> None:
+        self._go_on((goal, self._nobody, self._nobody), after)
+        self.state = after
+
+    def _arguments(
+        self, orders: tuple[Array, Array, Array], before: State, after: State
+    ) -> tuple[Any, ...]:
+        """What `step_quiet` is called with."""
+        path = self._pathless if after.path is None else after.path
+        return (
+            *(before.position, before.velocity, before.time, self._worlds, *orders),
+            *(self._kicks, self.control_dt, self.substeps),
+            *(2 * self.cast.table.paddle_radius, self._flags, path),
+            *(getattr(after, name) for name in RESULTS),
+            self._left,
         )
-        return flags[:, EVENT].nonzero()[0].tolist() if left else []
+
+    def _leave_all(self, before: State, after: State) -> None:
+        """All worlds as they were, for Python to step."""
+        for name in RESULTS:
+            getattr(after, name)[...] = getattr(self.quiet, name)
+        for name in ("position", "velocity"):
+            getattr(after, name)[...] = getattr(before, name)
+        after.time[...] = before.time + self.control_dt
+        self._flags[:, SUBSTEP], self._left[0] = -1, self.num_worlds
+
+    def _go_on(self, orders: tuple[Array, Array, Array], after: State) -> None:
+        """Step the worlds that are not quiet to the end, and tell what happened."""
+        position, velocity, path = after.position, after.velocity, after.path
+        if self._left[0]:
+            goal, told, lifted = orders
+            for i in np.flatnonzero(self._flags[:, EVENT] | (not AVAILABLE)).tolist():
+                own = None if path is None else path[i]
+                hands = goal[i], told[i], lifted[i]
+                self._finish(i, *hands, position[i], velocity[i], own)
+        if path is not None:
+            path[..., 2] += self._kicks[:, None, : path.shape[2]]
+        for i in self._eventful:
+            space = self.spaces[i]
+            for name in EVENTS:
+                getattr(after, name)[i] = getattr(space, name)
+            for k, place in space.out.items():
+                puck = self.cast.bodies.puck.start + k
+                position[i, puck], velocity[i, puck] = place, 0.0
 
     def _finish(
         self,
@@ -123,32 +145,18 @@ class Pymunk(Backend):
         lifted: Array,
         position: Array,
         velocity: Array,
-        path: Array,
+        path: Array | None,
     ) -> None:
         """Step a world to the end of the control step, in place."""
         space, seats = self.spaces[i], len(goal)
         speeds = velocity[:seats].copy()
-        path_or_none = path if self.cast.path else None
-        space.step(position[:seats], speeds, goal, told, lifted, path_or_none)
+        space.step(position[:seats], speeds, goal, told, lifted, path)
         rows = space.read()
         position[: len(rows)], velocity[: len(rows)] = rows[:, :2], rows[:, 2:]
         velocity[: len(rows), 0] += self._kicks[i, : len(rows)]
         velocity[:seats] = speeds
         if self._flags[i, EVENT]:
             self._eventful.append(i)
-
-    def _with_events(self, state: State, worlds: list[int]) -> State:
-        """The state with the contacts and crossings of some worlds."""
-        arrays = {name: getattr(self.quiet, name).copy() for name in EVENTS}
-        puck = self.cast.bodies.puck.start
-        for i in worlds:
-            space = self.spaces[i]
-            for name, array in arrays.items():
-                array[i] = getattr(space, name)
-            for k, place in space.out.items():
-                state.position[i, puck + k] = place
-                state.velocity[i, puck + k] = 0.0
-        return state.having(arrays)
 
     def _lift(self, lifted: Array, up: bool) -> None:
         for i, k in zip(*np.nonzero(lifted), strict=True):

@@ -1,0 +1,95 @@
+"""Steps on arrays that stay: the same numbers, and nobody else holds the arrays."""
+
+import numpy as np
+import pytest
+
+import marl_airhockey as ah
+from marl_airhockey.chain import Chain, Fixed, Stage
+from marl_airhockey.loops import load
+
+GAMES = [
+    ("juggle", {}),
+    ("juggle", {"profile": "robot"}),
+    ("hit_goal", {"goals": "dict"}),
+    ("move_block", {"physics": {"tilt": (3.0, 8.0)}}),
+    ("duel", {}),
+    ("free_for_all", {}),
+]
+
+
+def play(world, steps):
+    """Everything that steps give, in the order of their making."""
+    rng, seen = np.random.default_rng(0), [world.reset(3)]
+    for k in range(steps):
+        if k == steps // 2:
+            seen.append(world.reset())
+        step = world.step(
+            rng.uniform(-1.3, 1.3, (len(world.seeds), len(world.open), 2))
+        )
+        seen += [step.observation, step.reward, step.terms, step.terminated]
+        seen += [step.truncated, step.sent, step.excess, step.success, step.first_shot]
+        seen += [world.state.position.copy(), world.state.touched_at.copy()]
+        seen += [{k: v.copy() for k, v in world.memory.items()}]
+        seen += [world.episode.returns.copy(), world.sent.copy()]
+    return seen
+
+
+@pytest.mark.parametrize("worlds", [1, 5])
+@pytest.mark.parametrize(("game", "keywords"), GAMES)
+def test_a_turn_gives_what_its_parts_give(game, keywords, backend, worlds, monkeypatch):
+    runs = []
+    for patience in (20, 10**9):
+        monkeypatch.setattr("marl_airhockey.world.PATIENCE", patience)
+        world = ah.make_world(game, worlds, backend=backend, max_cycles=90, **keywords)
+        runs.append(play(world, 250))
+        assert (world._turn is not None) == (patience == 20)
+        world.close()
+    np.testing.assert_equal(runs[0], runs[1])
+
+
+def test_what_a_step_gives_is_the_users_own():
+    world = ah.make_world("juggle", 3, backend="batched")
+    world.reset(0)
+    steps, kept = [], []
+    for k in range(80):
+        step = world.step(np.full((3, 1, 2), np.sin(k)))
+        steps.append(step)
+        kept.append([step.observation.copy(), step.reward.copy(), step.success.copy()])
+        kept[-1] += [step.sent.copy(), step.excess.copy(), step.terms["hit"].copy()]
+    for step, old in zip(steps, kept, strict=True):
+        now = [step.observation, step.reward, step.success, step.sent, step.excess]
+        np.testing.assert_equal([*now, step.terms["hit"]], old)
+
+
+def test_an_action_that_is_not_finite_moves_nothing():
+    world = ah.make_world("juggle", 3, backend="batched")
+    world.reset(0)
+    actions = np.zeros((3, 1, 2))
+    for _ in range(60):
+        world.step(actions)
+    before = world.state.position.copy()
+    bad = actions.copy()
+    bad[1] = np.nan
+    with pytest.raises(ValueError, match="finite"):
+        world.step(bad)
+    np.testing.assert_array_equal(world.state.position, before)
+    world.step(actions)
+
+
+def test_a_chain_calls_its_stages_until_one_stops_it():
+    source = (
+        "import numpy as np\n"
+        "SIGNATURE = 'boolean(float64[:, ::1], float64[::1], float64)'\n"
+        "def kernel(x, limit, add):\n"
+        "    x += add\n"
+        "    return x.max() < limit[0]\n"
+    )
+    add = load(source).kernel
+    x, limit = np.zeros((4, 2)), np.full(1, 2.5)
+    first = Stage(add, (x, Fixed(limit), 1.0), stops=True)
+    chain = Chain(4, [first, Stage(add, (x, Fixed(limit), 0.25))])
+    assert chain(0)
+    np.testing.assert_array_equal(x, 1.25)
+    assert chain(0)
+    assert not chain(0)
+    np.testing.assert_array_equal(x, 3.5)
