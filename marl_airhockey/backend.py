@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from marl_airhockey.cast import Cast
-from marl_airhockey.chain import Stage
+from marl_airhockey.chain import Stage, Unchained
 from marl_airhockey.state import RESULTS, Array, State, still_state
 
 if TYPE_CHECKING:
@@ -121,9 +121,9 @@ class Backend(ABC):
             after: the step; its motion and events are filled.
 
         Raises:
-            TypeError: a step is not one compiled function.
+            Unchained: a step is not one compiled function.
         """
-        raise TypeError(f"{type(self).__name__} has no compiled step")
+        raise Unchained(f"{type(self).__name__} has no compiled step")
 
     def begin(self) -> None:
         """What is to be done before a stage."""

@@ -22,6 +22,10 @@ from marl_airhockey.loops import load
 from marl_airhockey.state import Array
 
 
+class Unchained(Exception):
+    """Why something is no stage of a chain."""
+
+
 class Fixed(NamedTuple):
     """An array that all worlds share."""
 

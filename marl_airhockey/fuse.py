@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.chain import Stage
+from marl_airhockey.chain import Stage, Unchained
 from marl_airhockey.loops import Call, Writer, load
 from marl_airhockey.pool import Pool
 from marl_airhockey.state import Array
@@ -69,10 +69,10 @@ class Fused:
         """The compiled loop from sources into sinks that it once gave, for a chain.
 
         Raises:
-            TypeError: there is none for such arrays.
+            Unchained: there is none for such arrays.
         """
         if self._plan is None:
-            raise TypeError(f"{self._name} is not compiled")
+            raise Unchained(f"{self._name} is not compiled")
         return self._plan.stage(sources, sinks)
 
     def _refuse(self, error: Exception) -> None:
@@ -144,7 +144,7 @@ class _Plan:
         outputs = [array for sink in sinks for array in sink.values()]
         kinds = [array.dtype for array in (*given, *outputs)]
         if kinds != self._kinds:
-            raise TypeError(f"arrays are {kinds}, the loop is for {self._kinds}")
+            raise Unchained(f"arrays are {kinds}, the loop is for {self._kinds}")
         return Stage(self._kernel, (*given, *outputs))
 
     def _copying(self, *arrays: Array) -> None:

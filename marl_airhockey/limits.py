@@ -231,11 +231,12 @@ def _filter(
 
             jx = dx * rate - pushed[b, s, 0]
             jy = dy * rate - pushed[b, s, 1]
-            jolt = np.sqrt(jx * jx + jy * jy) * rate
+            jolt, rough = jx * jx + jy * jy, JERK * most
             fast = max(norm - top * (1 + 1e-6), 0.0)
             hard = max(change * rate - acceleration[b] * (1 + 1e-6), 0.0)
-            jerky = max(jolt - JERK * acceleration[b], 0.0)
-            held = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2)
+            # Roots are dear; most worlds need neither.
+            jerky = rate * (np.sqrt(jolt) - rough) if jolt > rough * rough else 0.0
+            held = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2) if count else 0.0
             excess[b, s, 0], excess[b, s, 1] = fast, hard
             excess[b, s, 2], excess[b, s, 3] = jerky, held
             cost = (fast + held) / top + (hard + jerky / JERK) / acceleration[b]

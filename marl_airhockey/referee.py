@@ -90,7 +90,7 @@ class Referee:
         """The same from and into arrays that stay, the last being those of a verdict.
 
         Raises:
-            TypeError: the rules are not compiled for such arrays.
+            Unchained: the rules are not compiled for such arrays.
         """
         sources = _sources(before, sent, after, memory, episode, limit)
         return self._fused.stage(sources, verdict)

@@ -28,7 +28,7 @@ class Turn:
         episode: its physics are read at every step.
 
     Raises:
-        TypeError: physics or rules are not one compiled function.
+        Unchained: physics or rules are not one compiled function.
     """
 
     def __init__(

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from marl_airhockey.backend import Backend, Command
+from marl_airhockey.chain import Unchained
 from marl_airhockey.draws import Draws
 from marl_airhockey.driver import Driver
 from marl_airhockey.episode import Episode, Step
@@ -263,7 +264,7 @@ class World:
                 verdict.memory,
                 episode,
             )
-        except TypeError:
+        except Unchained:
             return None
 
     def _ask(self, actions: Array) -> tuple[Array, Array | None]:

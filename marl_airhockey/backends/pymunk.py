@@ -9,7 +9,7 @@ import numpy as np
 
 from marl_airhockey.backend import Backend, Command
 from marl_airhockey.cast import Cast
-from marl_airhockey.chain import Fixed, Stage
+from marl_airhockey.chain import Fixed, Stage, Unchained
 from marl_airhockey.chipmunk import AVAILABLE, EVENT, SUBSTEP, new_flags, step_quiet
 from marl_airhockey.space import Space
 from marl_airhockey.state import EVENTS, RESULTS, Array, State
@@ -77,7 +77,7 @@ class Pymunk(Backend):
 
     def stage(self, goal: Array, before: State, after: State) -> Stage:
         if self._turns or not AVAILABLE:
-            raise TypeError("steps of squares, and on this system, need Python")
+            raise Unchained("steps of squares, and on this system, need Python")
         orders = goal, self._nobody, self._nobody
         *arguments, left = self._arguments(orders, before, after)
         return Stage(step_quiet, (*arguments, Fixed(left)))
