@@ -80,7 +80,7 @@ class World:
         self._delay = Delay(longest, dt, (b, n, 2)) if longest else None
         self.seeds = np.zeros(b, np.int64)
         self._seeded = False
-        self.episode = Episode(
+        self._episode = Episode(
             np.zeros(b, np.int64),
             np.zeros(b, np.int64),
             np.zeros((b, n)),
@@ -90,27 +90,47 @@ class World:
         self._streams: dict[str, Draws] = {}
         for purpose in ("start", "physics", "sensor", "serve"):
             self._streams[purpose] = Draws.keyed(self.seeds, self.seeds, purpose)
-        self.state = still_state(cast.bodies, b, len(cast.mouths))
-        self.memory = {}
-        self.sensed = self.state
+        self._state: State = still_state(cast.bodies, b, len(cast.mouths))
+        self._memory: Memory = {}
+        self._sensed = self._state
         self._pushed = np.zeros((b, n, 2))
-        self.asked, self.sent = np.zeros((2, b, n, 2))
+        self.asked, self._sent = np.zeros((2, b, n, 2))
         self._steps = 0
         self._turn: Turn | None = None
 
-    state: State
-    """As it is, table frame. Its arrays, and those of ``memory``, ``episode`` and
-    ``sent``, are overwritten by the step after the next: copy what is to stay."""
-    memory: Memory
-    """What the scenario remembers of the episode"""
     seeds: Array
     """(B,) of each world"""
-    sensed: State
-    """What the sensor makes of the state, table frame"""
     asked: Array
     """(B, seats, 2) what was asked in the last step, after its delay: ego fractions"""
-    sent: Array
-    """(B, seats, 2) what was sent in the last step, table frame, m/s"""
+
+    # What a turn works on is overwritten by the step after the next, so what others get
+    # is a copy.
+    @property
+    def state(self) -> State:
+        """As it is, table frame."""
+        return self._state if self._turn is None else self._state.map(np.copy)
+
+    @property
+    def sensed(self) -> State:
+        """What the sensor makes of the state, table frame."""
+        return self._sensed if self._turn is None else self._sensed.map(np.copy)
+
+    @property
+    def memory(self) -> Memory:
+        """What the scenario remembers of the episode."""
+        if self._turn is None:
+            return self._memory
+        return {name: array.copy() for name, array in self._memory.items()}
+
+    @property
+    def episode(self) -> Episode:
+        """Counters of the running episodes."""
+        return self._episode if self._turn is None else self._episode.copied()
+
+    @property
+    def sent(self) -> Array:
+        """(B, seats, 2) what was sent in the last step, table frame, m/s."""
+        return self._sent if self._turn is None else self._sent.copy()
 
     @property
     def max_cycles(self) -> int:
@@ -124,7 +144,7 @@ class World:
     def seed(self, seed: int) -> None:
         """Give world i the seed + i; takes effect at the next `reset`."""
         self.seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
-        self.episode.number[:] = 0
+        self._episode.number[:] = 0
         self._seeded = True
 
     def reset(self, seed: int | None = None) -> Observation:
@@ -143,7 +163,7 @@ class World:
 
     def restart(self, worlds: Array) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
-        episode = self.episode
+        episode = self._episode
         episode.number[worlds] += 1
         for purpose, stream in self._streams.items():
             stream.renew(worlds, self.seeds, episode.number, purpose)
@@ -165,30 +185,30 @@ class World:
         if self._delay is not None:
             idle = np.zeros((len(worlds), self._delay.depth, *self._pushed.shape[1:]))
             self._delay.fill(worlds, idle)
-        self.sensed = self._look(worlds)
+        self._sensed = self._look(worlds)
         for seat in self.driven:
             seat.start(worlds, self.seeds, episode.number)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put some worlds into rows of a state and a memory."""
         if len(worlds) == self.num_worlds:
-            self.state, self.memory = rows, memory
+            self._state, self._memory = rows, memory
         else:
-            self.state = self.state.write(worlds, rows, self.backend.quiet)
+            self._state = self._state.write(worlds, rows, self.backend.quiet)
             for name, row in memory.items():
-                self.memory[name][worlds] = row
-        self.backend.start(self.state, worlds)
+                self._memory[name][worlds] = row
+        self.backend.start(self._state, worlds)
 
     def _look(self, starting: Array | None = None) -> State:
         """Sense the state, beginning anew in some worlds, by index."""
-        values, stream = self.episode.physics, self._streams["sensor"]
+        values, stream = self._episode.physics, self._streams["sensor"]
         if starting is None:
-            return self.sensor.sense(self.state, values, stream)
-        return self.sensor.start(starting, self.state, values, stream)
+            return self.sensor.sense(self._state, values, stream)
+        return self.sensor.start(starting, self._state, values, stream)
 
     def observation(self) -> Observation:
         """What the open seats are shown now."""
-        return self.observer.read(self.sensed, self.memory, self.open)
+        return self.observer.read(self._sensed, self._memory, self.open)
 
     def step(self, actions: Array) -> Step:
         """Move all worlds by one control step.
@@ -200,9 +220,9 @@ class World:
         Raises:
             ValueError: a wrong shape, or an element that is not finite.
         """
-        values, before = self.episode.physics, self.state
+        values, before = self._episode.physics, self._state
         asked, told = self._ask(actions)
-        retired, shut = self.scenario.retired(self.memory), None
+        retired, shut = self.scenario.retired(self._memory), None
         if retired is not None and retired.any():
             asked, told = self._park(retired, asked, told)
             shut = retired[:, self._owner] & (self._owner >= 0)
@@ -213,11 +233,11 @@ class World:
             after, sent, verdict = self._by_parts(asked, told, shut)
         else:
             after, sent, verdict = self._turn(
-                asked, before, self.memory, self.episode, self._pushed
+                asked, before, self._memory, self._episode, self._pushed
             )
-        self.sent, self._pushed = sent.velocity, sent.pushed
-        vars(self.episode).update(verdict.counters)
-        self.state, self.memory = after, verdict.memory
+        self._sent, self._pushed = sent.velocity, sent.pushed
+        vars(self._episode).update(verdict.counters)
+        self._state, self._memory = after, verdict.memory
         result = self._report(verdict, sent.excess)
         self._go_on(result, verdict.shown)
         return result
@@ -226,7 +246,7 @@ class World:
         self, asked: Array, told: Array | None, shut: Array | None
     ) -> tuple[State, Sent, Verdict]:
         """Limits, physics and judging of a step, one after the other."""
-        values, before = self.episode.physics, self.state
+        values, before = self._episode.physics, self._state
         sent = limits(
             asked,
             before.position,
@@ -244,7 +264,7 @@ class World:
             sent = sent._replace(pushed=pushed)
         after = self.backend.step(Command(sent.velocity, told, shut))
         verdict = self.referee.judge(
-            before, sent.velocity, after, self.memory, self.episode, self._limit
+            before, sent.velocity, after, self._memory, self._episode, self._limit
         )
         self._steps += 1
         if self._steps == PATIENCE and not spreads(self.num_worlds):
@@ -253,7 +273,7 @@ class World:
 
     def _compiled(self, state: State, verdict: Verdict) -> Turn | None:
         """Steps like the last one as one compiled call, if that can be."""
-        episode = self.episode.counted(verdict.counters)
+        episode = self._episode.counted(verdict.counters)
         try:
             return Turn(
                 self.backend,
@@ -276,12 +296,12 @@ class World:
             return actions.astype(np.float64), None
         asked = np.zeros((self.num_worlds, len(self.cast.seats), 2))
         asked[:, self.open] = actions
-        told = None
+        told, episode = None, self._episode
         for seat in self.driven:
             place = seat.measured()
             if place is None:
                 asked[:, seat.index] = seat.act(
-                    self.sensed, self.memory, self.episode.physics, self.episode.cycles
+                    self._sensed, self._memory, episode.physics, episode.cycles
                 )
                 continue
             if told is None:
@@ -300,7 +320,7 @@ class World:
         return np.where(retired[..., None], 0.0, asked), told
 
     def _report(self, verdict: Verdict, excess: Array) -> Step:
-        outcome, episode, terms = verdict.outcome, self.episode, verdict.terms
+        outcome, episode, terms = verdict.outcome, self._episode, verdict.terms
         reward, sent, cost = outcome["reward"], outcome["sent"], excess[..., -1]
         success = episode.success.copy()
         if self.driven:
@@ -322,8 +342,10 @@ class World:
 
     def _go_on(self, result: Step, shown: dict[str, Array]) -> None:
         """Serve again inside episodes, sense, and restart the worlds that ended."""
-        self.sensed = self._look()
-        served = self.scenario.restart(self._streams["serve"], self.state, self.memory)
+        self._sensed = self._look()
+        served = self.scenario.restart(
+            self._streams["serve"], self._state, self._memory
+        )
         if served is not None:
             worlds, rows, memory = served
             live = ~(result.terminated | result.truncated)[worlds]
@@ -331,7 +353,7 @@ class World:
                 worlds, rows = worlds[live], rows.map(lambda x: x[live])
                 memory = {k: v[live] for k, v in memory.items()}
             self._place(worlds, rows, memory)
-            self.sensed = self._look(worlds)
+            self._sensed = self._look(worlds)
         if shown and served is None:
             result.observation = self.observer.take(shown, self.open)
         else:
@@ -346,8 +368,8 @@ class World:
 
     def _renewed(self, observation: Observation, worlds: Array) -> Observation:
         """The observation with that of some worlds read anew."""
-        sensed = self.sensed.map(lambda x: x[worlds])
-        memory = {k: v[worlds] for k, v in self.memory.items()}
+        sensed = self._sensed.map(lambda x: x[worlds])
+        memory = {k: v[worlds] for k, v in self._memory.items()}
         fresh = self.observer.read(sensed, memory, self.open, worlds=worlds)
         if isinstance(observation, np.ndarray):
             return _merged(observation, worlds, np.asarray(fresh))

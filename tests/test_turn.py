@@ -50,15 +50,19 @@ def test_a_turn_gives_what_its_parts_give(game, keywords, backend, worlds, monke
 def test_what_a_step_gives_is_the_users_own():
     world = ah.make_world("juggle", 3, backend="batched")
     world.reset(0)
-    steps, kept = [], []
+    steps, kept, worlds, copies = [], [], [], []
     for k in range(80):
         step = world.step(np.full((3, 1, 2), np.sin(k)))
+        now = [world.state.position, world.memory["hits"], world.episode.cycles]
+        worlds.append([*now, world.sent, world.sensed.velocity])
+        copies.append([array.copy() for array in worlds[-1]])
         steps.append(step)
         kept.append([step.observation.copy(), step.reward.copy(), step.success.copy()])
         kept[-1] += [step.sent.copy(), step.excess.copy(), step.terms["hit"].copy()]
     for step, old in zip(steps, kept, strict=True):
         now = [step.observation, step.reward, step.success, step.sent, step.excess]
         np.testing.assert_equal([*now, step.terms["hit"]], old)
+    np.testing.assert_equal(worlds, copies)
 
 
 def test_an_action_that_is_not_finite_moves_nothing():
