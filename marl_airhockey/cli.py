@@ -29,6 +29,7 @@ from marl_airhockey.cli_common import (
     environment,
     grade,
     settings,
+    train_shown,
 )
 from marl_airhockey.extras import need
 from marl_airhockey.learn.policy import Policy
@@ -111,7 +112,6 @@ def train(
 ) -> None:
     """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
     from marl_airhockey.learn.config import preset
-    from marl_airhockey.learn.train import train as run
 
     if resume is None:
         changes = settings(change) | {
@@ -140,15 +140,7 @@ def train(
         if any(given) or any(x is not None for x in (num_env_runners, init, physics)):
             raise ValueError("--resume goes on as the run was begun: give nothing else")
         config, folder = None, resume
-    with bar() as progress:
-        task = progress.add_task(folder.name, total=None, note="")
-
-        def report(done: int, total: int, row: dict[str, float]) -> None:
-            name = grade(row)
-            note = f"{name} {row[name]:.2f}" if row else ""
-            progress.update(task, completed=done, total=total, note=note)
-
-        row = run(config, folder, report)
+    row = train_shown(config, folder)
     if as_json:
         console.print_json(json.dumps({"run": str(folder), **row}))
         return

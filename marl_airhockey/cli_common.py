@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -13,6 +13,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from marl_airhockey.make import Keywords
 from marl_airhockey.physics import load_physics
 from marl_airhockey.threads import use_threads
+
+if TYPE_CHECKING:
+    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.judge import Grades
 
 app = typer.Typer(
     help="Air hockey for robot learning and multi-agent RL.",
@@ -97,3 +101,18 @@ def bar() -> Progress:
         TextColumn("{task.fields[note]}"),
         console=Console(stderr=True),
     )
+
+
+def train_shown(config: TrainConfig | None, folder: Path) -> Grades:
+    """`learn.train.train` with a progress bar."""
+    from marl_airhockey.learn.train import train
+
+    with bar() as progress:
+        task = progress.add_task(folder.name, total=None, note="")
+
+        def report(done: int, total: int, row: dict[str, float]) -> None:
+            name = grade(row)
+            note = f"{name} {row[name]:.2f}" if row else ""
+            progress.update(task, completed=done, total=total, note=note)
+
+        return train(config, folder, report)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
@@ -17,11 +17,16 @@ from marl_airhockey.cli_common import (
     bar,
     console,
     settings,
+    train_shown,
 )
+from marl_airhockey.driver import Driver
 from marl_airhockey.extras import need
 from marl_airhockey.make import Keywords
-from marl_airhockey.physics import PARAMETERS, load_physics
-from marl_airhockey.registry import make_driver
+from marl_airhockey.physics import PARAMETERS, PROFILES, load_physics, unknown
+from marl_airhockey.registry import find_backend, make_driver, make_scenario
+
+if TYPE_CHECKING:
+    from marl_airhockey.learn.config import TrainConfig
 
 
 def transfer(
@@ -41,7 +46,8 @@ def transfer(
     ] = "ideal,robot",
     episodes: Annotated[int, typer.Option(help="Of each.", min=1)] = 200,
     fine_tune: Annotated[
-        int, typer.Option(help="Steps by which runs are trained on, on robosuite.")
+        int,
+        typer.Option(help="Steps by which runs are trained on, on robosuite.", min=0),
     ] = 0,
     seed: Annotated[int, typer.Option(help="Of training.")] = 0,
     out: Annotated[
@@ -52,30 +58,34 @@ def transfer(
     as_json: AsJson = False,
 ) -> None:
     """How do policies from the 2D table do elsewhere? Success with 95 % intervals."""
-    from marl_airhockey.learn.train import train
     from marl_airhockey.transfer import measure, picture, schooled, tuned
 
     folder = out or Path("runs") / f"transfer-{scenario}"
-    backends, profiles = to.split(","), profile.split(",")
+    # All that may be wrong is looked at before anything takes time.
+    backends, profiles = _list(to), _list(profile)
+    for backend in backends:
+        find_backend(backend)
+    for kind in profiles:
+        if kind not in PROFILES:
+            raise ValueError(unknown("profile", kind, PROFILES))
+    make_scenario(scenario, **settings(option))
+    for name in policy or []:
+        make_driver(name)
     names = list(policy or [])
     if not names:
-        for kind in ("ideal", "robot"):
-            run = folder / kind
-            if not (run / "best.zip").exists():
-                console.print(f"training in the {kind} profile: {run}")
-                train(schooled(scenario, kind, seed), run)
-            names.append(str(run))
+        for kind in PROFILES:
+            names.append(_run(folder / kind, schooled(scenario, kind, seed)))
     if fine_tune:
-        for name in [n for n in names if (Path(n) / "config.toml").exists()]:
-            run = folder / f"{Path(name).name}-tuned"
-            if not (run / "best.zip").exists():
-                console.print(f"training on, on robosuite: {run}")
-                train(tuned(Path(name), fine_tune), run)
-            names.append(str(run))
-    policies = {
-        Path(name).name if Path(name).exists() else name: make_driver(name)
-        for name in names
-    }
+        runs = [n for n in names if (Path(n) / "config.toml").exists()]
+        if not runs:
+            raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
+        for name in runs:
+            run = folder / f"{Path(name).name}-tuned-{fine_tune}"
+            names.append(_run(run, tuned(Path(name), fine_tune)))
+    policies: dict[str, Driver] = {}
+    for name in names:
+        short = Path(name).name if Path(name).exists() else name
+        policies[name if short in policies else short] = make_driver(name)
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)
         task = progress.add_task("measuring", total=total, note="")
@@ -109,6 +119,18 @@ def transfer(
             table.add_row(name, backend, *cells)
     console.print(table)
     console.print("files:", folder / "transfer.json", folder / "transfer.png")
+
+
+def _list(names: str) -> list[str]:
+    """The names in a list with commas, each once."""
+    return list(dict.fromkeys(name.strip() for name in names.split(",")))
+
+
+def _run(folder: Path, config: TrainConfig) -> str:
+    """Train what is not trained yet, or not to its end."""
+    begun = (folder / "config.toml").exists()
+    train_shown(None if begun else config, folder)
+    return str(folder)
 
 
 def fit(

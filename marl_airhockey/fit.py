@@ -113,7 +113,8 @@ def recorded(paths: Sequence[Path]) -> Play:
         sent = np.array([row["sent"] for row in steps])
         parts.append((rows, speeds, sent, follows))
     if len(names) != 1:
-        raise ValueError(f"recordings of one scenario are needed, not {sorted(names)}")
+        found = ", ".join(sorted(names)) or "no recordings (.jsonl files)"
+        raise ValueError(f"recordings of one scenario are needed, there are: {found}")
     joined = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Play(scenario.cast, meta["control_dt"], *joined)
 
@@ -203,7 +204,7 @@ class _Model:
         if len(self.rows) < FEWEST:
             raise ValueError(
                 f"fit: {len(self.rows)} stretches of {STRETCH} s are too few; at least "
-                f"{FEWEST} are needed"
+                f"{FEWEST} are needed: play longer (--steps)"
             )
         kind = find_backend("batched")
         self._backend = kind(

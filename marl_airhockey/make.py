@@ -12,6 +12,7 @@ from marl_airhockey.driver import Driver
 from marl_airhockey.physics import Physics, Value, unknown
 from marl_airhockey.registry import find_backend, make_driver, make_scenario
 from marl_airhockey.scenario import Scenario
+from marl_airhockey.threads import threads
 from marl_airhockey.world import World
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ def build_world(
                 unknown("keyword", name, Keywords.__annotations__)
                 + "; fields of the scenario go into options={...}"
             )
+    threads()  # Refused here if it makes no sense, not at the first step.
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
     game = find_scenario(scenario, keywords)

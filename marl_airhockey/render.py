@@ -266,7 +266,13 @@ class Renderer:
         return taken
 
     def show(self) -> Array | None:
-        """The picture; in human mode it goes to the window and None comes back."""
+        """The picture; in human mode it goes to the window and None comes back.
+
+        Raises:
+            RuntimeError: no episode has begun.
+        """
+        if not self.world.episode.number[self.index]:
+            raise RuntimeError("render: call reset() first; there is nothing to see")
         picture = self.picture()
         if self.mode == "rgb_array":
             return picture

@@ -50,6 +50,11 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads(), "marl_airhockey")
 
 
+# A child of a process has none of its threads.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> None:
     """Call ``work`` on slices of rows 0 .. ``rows``, side by side.
 

@@ -18,6 +18,7 @@ mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("robosuite")
 
 from marl_airhockey.arm.law import forget  # noqa: E402
+from marl_airhockey.arm.robot import AirHockey  # noqa: E402
 
 HOME = make_seat("robot", TABLE, 0)
 FASTEST = 0.9 * np.pi
@@ -135,7 +136,6 @@ def test_nothing_escapes():
 @pytest.mark.parametrize("tilt", [0.0, 5.5])
 def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
     from marl_airhockey.arm.pose import reach_for
-    from marl_airhockey.arm.robot import AirHockey
 
     seats = (HOME, make_seat("robot", TABLE, 2))
     env = AirHockey(cast=Cast(TABLE, seats, physics={"tilt": tilt}))
@@ -208,6 +208,21 @@ def test_a_row_does_not_depend_on_the_others():
         return world.state.position[0]
 
     np.testing.assert_array_equal(run(1), run(3))
+
+
+def test_an_episode_knows_nothing_of_the_one_before():
+    world = ah.make_world("juggle", num_worlds=2, backend="robosuite")
+
+    def play(steps):
+        rng, seen = np.random.default_rng(0), [world.reset(3)]
+        for _ in range(steps):
+            seen.append(world.step(rng.uniform(-1, 1, (2, 1, 2))).observation)
+        return np.array(seen)
+
+    first = play(40)
+    np.testing.assert_array_equal(play(40), first)
+    world.reset(8)
+    np.testing.assert_array_equal(play(40), first)
 
 
 def test_workers_change_nothing(monkeypatch):
@@ -321,5 +336,9 @@ def test_what_an_arm_cannot_do_is_refused():
     ):
         with pytest.raises(ValueError, match=words):
             ah.make_world(game, backend="robosuite", options=options)
+    with pytest.raises(ValueError, match=r"substeps: 5 are too few.*at least 13"):
+        ah.make_world("juggle", backend="robosuite", substeps=5)
+    with pytest.raises(ValueError, match="by as many UR5e"):
+        AirHockey(robots="Panda")
     far = Cast(TABLE, (HOME,), pucks=1, mouths=(Mouth("goal", 2, 0.3),), blocks=1)
     assert "goal mouth" in find_backend("robosuite").supports(far)

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from marl_airhockey.cli import app
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
@@ -52,3 +53,30 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
     lost = preset("reach", {**SMALL, "init": str(tmp_path / "nowhere")})
     with pytest.raises(ValueError, match="no folder of a run"):
         train(lost, tmp_path / "lost")
+
+
+def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
+    """And looks at all that is asked before it trains anything."""
+    out = str(tmp_path)
+    ask = ["transfer", "reach", "--out", out, "--episodes", "5", "--to", "batched"]
+    for wrong, words in (
+        (["--profile", "real"], "unknown profile 'real'"),
+        (["--to", "batched,mujoco"], "unknown backend 'mujoco'"),
+        (["--policy", "still", "--fine-tune", "64"], "none is the folder of a run"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            app([*ask, *wrong], standalone_mode=False)
+    assert not list(tmp_path.iterdir())
+    trained = []
+
+    def train(config, folder):
+        trained.append((folder.name, config is None))
+        folder.mkdir(exist_ok=True)
+        (folder / "config.toml").touch()
+        raise RuntimeError("cut off")
+
+    monkeypatch.setattr("marl_airhockey.cli_transfer.train_shown", train)
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="cut off"):
+            app(ask, standalone_mode=False)
+    assert trained == [("ideal", False), ("ideal", True)]

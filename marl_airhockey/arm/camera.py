@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,6 +41,8 @@ class Camera:
                 "set MUJOCO_GL=egl before mujoco is imported, or libosmesa6 and "
                 f"set osmesa ({error})"
             ) from error
+        # Before MuJoCo ends OpenGL at the exit, even if nobody closes the environment.
+        atexit.register(_close, weakref.ref(self))
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
         self._option.geomgroup[1] = 1
@@ -79,3 +83,9 @@ class Camera:
     def close(self) -> None:
         """Let go of the OpenGL context."""
         self._renderer.close()
+
+
+def _close(camera: weakref.ref[Camera]) -> None:
+    found = camera()
+    if found is not None:
+        found.close()

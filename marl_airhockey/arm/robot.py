@@ -111,12 +111,17 @@ class AirHockey(ManipulationEnv):
         **rest: Any,
     ) -> None:
         self.cast = cast if cast is not None else usual_cast()
+        names = [robots] * len(self.cast.seats) if isinstance(robots, str) else robots
+        if list(names) != [ARM] * len(self.cast.seats):
+            raise ValueError(
+                f"robots: {robots!r}; a cast of {len(self.cast.seats)} seats is played "
+                f"by as many {ARM}"
+            )
         self.place = Place(self.cast.defaults.get("tilt", 0.0))
         period = 1 / control_freq
         count = len(self.cast.seats)
         self.hands = [Hand(self.cast, self.place, i, period) for i in range(count)]
         macros.SIMULATION_TIMESTEP = timestep
-        names = [robots] * count if isinstance(robots, str) else list(robots)
         configs = [
             {
                 "type": AirHockeyController.name,
@@ -147,7 +152,7 @@ class AirHockey(ManipulationEnv):
         self.surface: Surface | None = None
         self._ready: list[Array | None] = [None] * count
         super().__init__(
-            robots=names,
+            robots=list(names),
             controller_configs=configs,
             gripper_types="AirHockeyPaddle",
             base_types="NullMount",

@@ -14,9 +14,6 @@ from marl_airhockey.arm.pose import reach_for
 from marl_airhockey.arm.surface import Surface
 from marl_airhockey.state import Array
 
-NEAR = 1e-5
-"""m: a paddle that is to start this near to where it is stays as it is."""
-
 
 class Arms:
     """A MuJoCo simulation of robosuite's model.
@@ -106,15 +103,20 @@ class Arms:
     def start(
         self, table: Table, position: Array, velocity: Array, angle: Array
     ) -> bool:
-        """Place all bodies; whether arms were moved, which are at rest then."""
-        d, seats, moved = self.data, self._seats, False
+        """Place all bodies; whether arms were moved, which are at rest then.
+
+        Arms stay as they are if their paddles are to be where they are, which is so
+        when a puck is served. Else nothing is left of what was before.
+        """
+        d, seats = self.data, self._seats
+        moved = bool((position[:seats] != self.report.paddles[:, :2]).any())
+        if moved:
+            mujoco.mj_resetData(self.model, d)
         for k, place in enumerate(self.surface.places):
             body, dof = seats + k, self.surface.dofs[k]
             d.qpos[place : place + 2], d.qpos[place + 2] = position[body], angle[body]
             d.qvel[dof : dof + 2], d.qvel[dof + 2] = velocity[body], 0.0
-        away = np.abs(position[:seats] - self.report.paddles[:, :2]).max()
-        if away > NEAR:
-            moved = True
+        if moved:
             for i in range(seats):
                 self._reach(i, position[i])
         if self._out.any():
@@ -137,9 +139,8 @@ class Arms:
             dofs,
             env.place.to_world(float(place[0]), float(place[1])),
             env.hands[i].grip,
-            d.qpos[joints].copy(),
+            env.robots[i].init_qpos,
         )
-        d.qvel[dofs] = 0.0
 
     def lead(self, old: Array, new: Array, period: float) -> Array:
         """(seats, 2) where the references of a step begin; they go on from the last."""

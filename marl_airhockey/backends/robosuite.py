@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import importlib.util
 import logging
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from marl_airhockey.arm.camera import Camera
 
 NEWEST = "mujoco==3.9.0"
+COARSEST = 0.004
+"""s of a physics step; with longer ones arms no longer follow."""
 
 
 class Robosuite(Backend):
@@ -71,6 +74,11 @@ class Robosuite(Backend):
         self, cast: Cast, num_worlds: int, control_dt: float, substeps: int
     ) -> None:
         super().__init__(cast, num_worlds, control_dt, substeps)
+        if control_dt / substeps > COARSEST:
+            least = math.ceil(control_dt / COARSEST - 1e-9)
+            raise ValueError(
+                f"substeps: {substeps} are too few to hold an arm: at least {least}"
+            )
         # Without a screen; MuJoCo reads it when it is imported.
         os.environ.setdefault("MUJOCO_GL", "egl")
         # Robosuite warns of files that nobody needs; errors are shown.
