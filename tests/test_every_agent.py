@@ -49,7 +49,7 @@ def test_it_plays_both_ends_alike(agent):
         getattr(flipped, name)[:] = turned[:, [1, 0, 2]]
     everywhere = np.arange(3)
     far._place(everywhere, flipped, far.memory)
-    far.sensed = far._look(everywhere)
+    far._sensed = far._look(everywhere)
     for world, seat in ((near, 0), (far, 1)):
         world.driven[seat]._draws.renew(everywhere, near.seeds, near.seeds, "same")
     for _ in range(40):

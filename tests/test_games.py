@@ -33,7 +33,7 @@ def mirrored(world):
     other = ah.make_world(Pair(), world.num_worlds)
     other.reset(0)
     other._place(np.arange(world.num_worlds), turned, other.memory)
-    other.sensed = other._look(np.arange(world.num_worlds))
+    other._sensed = other._look(np.arange(world.num_worlds))
     return other
 
 
@@ -97,7 +97,7 @@ def place_puck(world, x, y, vx=0.0, vy=0.0):
     rows = world.state.map(np.copy)
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (x, y), (vx, vy)
     world._place(np.arange(world.num_worlds), rows, world.memory)
-    world.sensed = world._look(np.arange(world.num_worlds))
+    world._sensed = world._look(np.arange(world.num_worlds))
 
 
 def idle(world, seconds):
@@ -176,7 +176,7 @@ def test_a_turned_game_gives_turned_rewards(name, backend):
         rows.puck[:, 0] = 0.2 * launch @ matrix.T
         rows.puck_velocity[:, 0] = 2.0 * launch[:, ::-1] @ matrix.T
         world._place(np.arange(count), rows, world.memory)
-        world.sensed = world._look()
+        world._sensed = world._look()
     paid = np.zeros(count, bool)
     for _ in range(30):
         asked = rng.uniform(-1, 1, (count, seats, 2))
@@ -296,7 +296,7 @@ def test_a_rally_counts_crossings_by_turns(backend):
     place_puck(world, -0.2, 0.2, 1.0)
     assert not sum(s.reward for s in idle(world, 0.5)).any(), "nobody had struck it"
     for toucher, paid in ((1, 1.0), (1, 0.0), (2, 1.0), (1, 1.0)):
-        world.memory["toucher"][:] = toucher
+        world._memory["toucher"][:] = toucher
         way = 1.0 if toucher == 1 else -1.0
         place_puck(world, -0.1 * way, 0.2, way)
         reward = sum(s.reward for s in idle(world, 0.3))
@@ -310,8 +310,8 @@ def test_mates_are_paid_for_striking_in_turn(backend):
     world.autoreset = False
     world.reset(0)
     for striker, paid in ((1, 0.0), (2, 1.0), (2, 0.0), (1, 1.0)):
-        world.memory["armed"][:], world.memory["struck_at"][:] = 1.0, -0.5
-        world.memory["striker"][:] = striker
+        world._memory["armed"][:], world._memory["struck_at"][:] = 1.0, -0.5
+        world._memory["striker"][:] = striker
         place_puck(world, -0.35, 0.0, 2.0)
         terms = [s.terms["pass"] for s in idle(world, 0.1)]
         assert sum(terms).tolist() == [[paid, paid]] * 2
