@@ -67,6 +67,10 @@ class Rate:
         }
 
 
+WARM = 100
+"""Steps before the first turn: all is compiled then, and episodes are out of step."""
+
+
 def measure(
     cases: Sequence[Case],
     rounds: int = 3,
@@ -131,7 +135,8 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
             world.step(drawn[count % DRAWN])
         return turns * case.worlds
 
-    step()
+    while count < WARM:
+        step()
     return step, len(world.open)
 
 

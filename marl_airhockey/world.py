@@ -346,7 +346,7 @@ class World:
         served = self.scenario.restart(
             self._streams["serve"], self._state, self._memory
         )
-        if served is not None:
+        if served is not None and len(served[0]):
             worlds, rows, memory = served
             live = ~(result.terminated | result.truncated)[worlds]
             if not live.all():
@@ -354,10 +354,12 @@ class World:
                 memory = {k: v[live] for k, v in memory.items()}
             self._place(worlds, rows, memory)
             self._sensed = self._look(worlds)
-        if shown and served is None:
-            result.observation = self.observer.take(shown, self.open)
-        else:
+        if not shown:
             result.observation = self.observation()
+        else:
+            result.observation = self.observer.take(shown, self.open)
+            if served is not None and len(served[0]):
+                result.observation = self._renewed(result.observation, worlds)
         if not self.autoreset:
             return
         worlds = np.flatnonzero(result.terminated | result.truncated)
