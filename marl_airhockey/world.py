@@ -346,8 +346,9 @@ class World:
         served = self.scenario.restart(
             self._streams["serve"], self._state, self._memory
         )
-        if served is not None and len(served[0]):
-            worlds, rows, memory = served
+        worlds = np.empty(0, np.int64) if served is None else served[0]
+        if served is not None and len(worlds):
+            _, rows, memory = served
             live = ~(result.terminated | result.truncated)[worlds]
             if not live.all():
                 worlds, rows = worlds[live], rows.map(lambda x: x[live])
@@ -358,7 +359,7 @@ class World:
             result.observation = self.observation()
         else:
             result.observation = self.observer.take(shown, self.open)
-            if served is not None and len(served[0]):
+            if len(worlds):
                 result.observation = self._renewed(result.observation, worlds)
         if not self.autoreset:
             return
