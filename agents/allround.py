@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey import tactics
-from marl_airhockey.driver import View
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import View
+from marl_airhockey.toolkit import tactics
+from marl_airhockey.types import Array
 
 
 @dataclass
@@ -32,7 +32,7 @@ class Allround(tactics.Scripted):
         own, (pace, lag) = view.state.paddle[:, view.seat], self._skill
         if not view.state.bodies.pucks:
             return np.zeros_like(own), memory
-        field = tactics.Field.of(view.cast, view.seat)
+        field = tactics.Field.of(view.scene, view.seat)
         aim = tactics.open_goal(view, field)
         strike, due = tactics.attack(view, field, aim, pace, lag)
         place, motion = tactics.nearest_puck(view, lag)
@@ -43,8 +43,8 @@ class Allround(tactics.Scripted):
             [np.full(len(own), field.edge + self.ready), 0.4 * place[:, 1]], -1
         )
         target = np.where(fast[:, None], guard, ready)
-        asked = np.where((can & ~fast)[:, None], strike, (target - own) * self.gain)
-        return self._paced(asked, view), memory
+        action = np.where((can & ~fast)[:, None], strike, (target - own) * self.gain)
+        return self._paced(action, view), memory
 
 
 make = Allround

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.driver import Driver, View
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.types import Array
 
 DEAD = 0.12
 """Share of the stick's way that is taken for rest."""
@@ -31,8 +31,8 @@ class Gamepad(Driver):
         tilt = np.hypot(*self.stick)
         # From the edge of the dead zone on, the speed grows from nothing.
         live = max(min(tilt, 1.0) - DEAD, 0.0) / (1.0 - DEAD) / max(tilt, 1e-9)
-        asked = live * np.array(self.stick)
-        return np.broadcast_to(asked, (len(view.draws), 2)).copy(), memory
+        action = live * np.array(self.stick)
+        return np.broadcast_to(action, (len(view.rng), 2)).copy(), memory
 
 
 make = Gamepad

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey import tactics
-from marl_airhockey.driver import View
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import View
+from marl_airhockey.toolkit import tactics
+from marl_airhockey.types import Array
 
 
 @dataclass
@@ -27,7 +27,7 @@ class Goalkeeper(tactics.Scripted):
         if view.state.bodies.pucks == 0:
             line = view.reach[:, 0].min() + self.depth
             return np.stack([line - own[:, 0], -own[:, 1]], -1) * self.gain, memory
-        field = tactics.Field.of(view.cast, view.seat)
+        field = tactics.Field.of(view.scene, view.seat)
         target = tactics.guard(view, field, self.depth, self._skill.lag)
         return self._paced((target - own) * self.gain, view), memory
 

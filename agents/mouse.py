@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.driver import Driver, View
-from marl_airhockey.rewards import length
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.core.geometry import length
+from marl_airhockey.types import Array
 
 
 class Mouse(Driver):
@@ -41,7 +41,7 @@ class Mouse(Driver):
             return np.zeros_like(own), memory
         way = np.array(self.target) - own
         far = np.maximum(length(way), 1e-9)
-        brake = self.brake * view.cast.seats[view.seat].acceleration
+        brake = self.brake * view.scene.seats[view.seat].acceleration
         speed = np.minimum(self.gain * far, np.sqrt(2.0 * brake * far))
         speed = np.minimum(speed, view.top_speed)
         return way * (speed / far / view.top_speed)[:, None], memory

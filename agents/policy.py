@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from marl_airhockey.learn.policy import Policy, load_policy
+from marl_airhockey.toolkit.policies import Policy, load_policy
 
 
 def make(path: str | Path, deterministic: bool = True) -> Policy:

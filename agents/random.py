@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from marl_airhockey.driver import Driver, View
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.types import Array
 
 
 class Random(Driver):
@@ -12,7 +12,7 @@ class Random(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        return view.draws.uniform(-1.0, 1.0, 2), memory
+        return view.rng.uniform(-1.0, 1.0, 2), memory
 
 
 make = Random

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.driver import Driver, View
-from marl_airhockey.rewards import length
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.core.geometry import length
+from marl_airhockey.types import Array
 
 
 @dataclass
@@ -27,14 +27,14 @@ class Reacher(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        if "goal" not in view.recall:
+        if "goal" not in view.scenario_memory:
             raise ValueError("reacher: this scenario has no goal to reach")
         own = view.state.paddle[:, view.seat]
         top = view.top_speed[:, None]
-        goal = view.recall["goal"]
-        if "goal_velocity" not in view.recall:
+        goal = view.scenario_memory["goal"]
+        if "goal_velocity" not in view.scenario_memory:
             return (goal - own) * self.gain / top, memory
-        wanted = view.recall["goal_velocity"]
+        wanted = view.scenario_memory["goal_velocity"]
         way = goal - own
         along = (way * wanted).sum(-1) / (wanted * wanted).sum(-1)
         aside = length(way - along[:, None] * wanted)

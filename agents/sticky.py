@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.draws import Draws
-from marl_airhockey.driver import Driver, View
-from marl_airhockey.state import Array
-from marl_airhockey.table import Seat
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.seat import Seat
+from marl_airhockey.types import Array
 
 
 @dataclass
@@ -18,13 +18,13 @@ class Sticky(Driver):
 
     hold: int = 10
 
-    def start(self, seat: Seat, draws: Draws, worlds: int) -> dict[str, Array]:
+    def start(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         return {"held": np.zeros((worlds, 2)), "age": np.zeros(worlds, np.int64)}
 
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        fresh = view.draws.uniform(-1.0, 1.0, 2)
+        fresh = view.rng.uniform(-1.0, 1.0, 2)
         again = (memory["age"] % self.hold == 0)[:, None]
         held = np.where(again, fresh, memory["held"])
         return held, {"held": held, "age": memory["age"] + 1}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.driver import Driver, View
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.types import Array
 
 
 class Still(Driver):
@@ -14,7 +14,7 @@ class Still(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        return np.zeros((len(view.draws), 2)), memory
+        return np.zeros((len(view.rng), 2)), memory
 
 
 make = Still

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey import tactics
-from marl_airhockey.driver import View
-from marl_airhockey.rewards import length
-from marl_airhockey.state import Array
+from marl_airhockey.contracts.driver import View
+from marl_airhockey.core.geometry import length
+from marl_airhockey.toolkit import tactics
+from marl_airhockey.types import Array
 
 
 @dataclass
@@ -34,11 +34,11 @@ class Striker(tactics.Scripted):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        state, rows = view.state, np.arange(len(view.draws))
+        state, rows = view.state, np.arange(len(view.rng))
         own, top = state.paddle[:, view.seat], view.top_speed[:, None]
         if not state.bodies.pucks:
             return np.zeros_like(own), memory
-        if view.cast.physics.get("tilt") == 0.0 and len(view.cast.seats) > 1:
+        if view.scene.physics.get("tilt") == 0.0 and len(view.scene.seats) > 1:
             return self._play(view), memory
         low = view.reach[:, 0].min()
         which = (state.puck[..., 0] + 0.4 * state.puck_velocity[..., 0]).argmin(-1)
@@ -66,18 +66,18 @@ class Striker(tactics.Scripted):
         rising = ~rests & (velocity[:, 0] > 0.1) & (puck[:, 0] > own[:, 0])
         home = np.stack([np.full(len(rows), low + 0.08), 0.6 * puck[:, 1]], -1)
         calm = np.where((rising & (due > 0.9))[:, None], home, wait)
-        asked = np.where(strike[:, None], through, (calm - own) * self.gain)
-        return asked / top, memory
+        action = np.where(strike[:, None], through, (calm - own) * self.gain)
+        return action / top, memory
 
     def _play(self, view: View) -> Array:
         """In a game on a level table: strike, or wait at home."""
-        field, (pace, lag) = tactics.Field.of(view.cast, view.seat), self._skill
+        field, (pace, lag) = tactics.Field.of(view.scene, view.seat), self._skill
         aim = tactics.open_goal(view, field)
         strike, due = tactics.attack(view, field, aim, pace, lag)
         own, low = view.state.paddle[:, view.seat], view.reach[:, 0].min()
         home = (np.array([low + 0.2, 0.0]) - own) * self.gain
-        asked = np.where(np.isfinite(due)[:, None], strike, home)
-        return self._paced(asked, view)
+        action = np.where(np.isfinite(due)[:, None], strike, home)
+        return self._paced(action, view)
 
     def _meeting(
         self, puck: Array, velocity: Array, line: float
@@ -95,11 +95,11 @@ class Striker(tactics.Scripted):
 
     @staticmethod
     def _target(view: View) -> Array:
-        if "goal" in view.recall:
-            return view.recall["goal"]
+        if "goal" in view.scenario_memory:
+            return view.scenario_memory["goal"]
         if view.state.bodies.blocks:
             return np.asarray(view.state.block.mean(-2))
-        return np.broadcast_to(np.array([0.6, 0.0]), (len(view.draws), 2))
+        return np.broadcast_to(np.array([0.6, 0.0]), (len(view.rng), 2))
 
 
 make = Striker

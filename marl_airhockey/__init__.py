@@ -7,15 +7,8 @@ if not (_here / "scenarios").is_dir():
     # In a checkout scenarios/ and agents/ lie beside this package; in a wheel, in it.
     __path__.append(str(_here.parent))
 
-from marl_airhockey.learn.policy import load_policy  # noqa: E402
-from marl_airhockey.make import (  # noqa: E402
-    env,
-    make_sb3_vec,
-    make_vec,
-    make_world,
-    parallel_env,
-)
-from marl_airhockey.registration import register_all  # noqa: E402
+from marl_airhockey.envs.registration import register_all  # noqa: E402
+from marl_airhockey.make import env, make_sb3_vec, make_vec, make_world, parallel_env  # noqa: E402
 from marl_airhockey.registry import (  # noqa: E402
     agent_names,
     backend_names,
@@ -23,6 +16,7 @@ from marl_airhockey.registry import (  # noqa: E402
     make_scenario,
     scenario_names,
 )
+from marl_airhockey.toolkit.policies import load_policy  # noqa: E402
 
 register_all()
 

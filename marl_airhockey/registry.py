@@ -11,22 +11,23 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
-from marl_airhockey.backend import Backend
-from marl_airhockey.driver import Driver
-from marl_airhockey.physics import unknown
-from marl_airhockey.scenario import Scenario
+from marl_airhockey.contracts.backend import Backend
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.errors import unknown_name
 
 ZOO = Path(__file__).parent / "zoo"
 
 
 def _names(folder: str) -> list[str]:
     package = importlib.import_module(f"marl_airhockey.{folder}")
-    return sorted(m.name for m in pkgutil.iter_modules(package.__path__))
+    found = pkgutil.iter_modules(package.__path__)
+    return sorted(m.name for m in found if not m.name.startswith("_"))
 
 
 def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
     if name not in names:
-        raise ValueError(unknown(kind, name, names))
+        raise ValueError(unknown_name(kind, name, names))
     return importlib.import_module(f"marl_airhockey.{folder}.{name}")
 
 
@@ -77,7 +78,7 @@ def make_agent(name: str, **options: Any) -> Driver:
     """
     if name.startswith("zoo/"):
         if name not in zoo_names():
-            raise ValueError(unknown("policy of the zoo", name, zoo_names()))
+            raise ValueError(unknown_name("policy of the zoo", name, zoo_names()))
         return make_agent("policy", path=ZOO / f"{name[4:]}.npz", **options)
     module = _load("driver", "agents", name, agent_names())
     known = list(inspect.signature(module.make).parameters)
@@ -100,7 +101,7 @@ def make_driver(text: str | Path) -> Driver:
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
         return make_agent("policy", path=path)
     raise ValueError(
-        unknown("driver", text, agent_names()) + "; or the path of a policy"
+        unknown_name("driver", text, agent_names()) + "; or the path of a policy"
     )
 
 
@@ -137,7 +138,7 @@ def _build(
 ) -> object:
     for option in options:
         if option not in known:
-            raise ValueError(unknown(what, option, known))
+            raise ValueError(unknown_name(what, option, known))
     try:
         inspect.signature(make).bind(**options)
     except TypeError as error:

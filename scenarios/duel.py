@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from marl_airhockey.versus import Versus
+from marl_airhockey.toolkit.versus import Versus
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.layout import Piece
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
-from marl_airhockey.table import Table
+from marl_airhockey.contracts.observable import Observable
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.core.table import Table
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +35,8 @@ class FreeForAll(Scenario):
     """m from the centre to each side."""
     lives: int = 3
     """Goals that a seat can take."""
-    mouth: float = 0.30
-    """m: width of the goal mouths."""
+    goal_width: float = 0.30
+    """m: width of the goal lines."""
     possession: float = 5.0
     """s: for so long a seat may have the puck in its reach."""
     jitter_weight: float = 0.0
@@ -49,18 +51,22 @@ class FreeForAll(Scenario):
         return Table.regular(self.sides, self.inradius)
 
     @cached_property
-    def cast(self) -> Cast:
+    def scene(self) -> Scene:
         sides = tuple(range(self.sides))
         seats = tuple(self.seat(side, sides, team=side) for side in sides)
-        mouths = tuple(Mouth(f"goal_{side}", side, self.mouth) for side in sides)
+        goal_lines = tuple(
+            GoalLine(f"goal_{side}", side, self.goal_width) for side in sides
+        )
         flat = {"tilt": 0.0}
-        return Cast(self.table_geometry, seats, pucks=1, mouths=mouths, physics=flat)
+        return Scene(
+            self.table_geometry, seats, pucks=1, goal_lines=goal_lines, physics=flat
+        )
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state, table = starts.first_state(self.cast, worlds), self.table_geometry
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state, table = starts.first_state(self.scene, worlds), self.table_geometry
         state.paddle[:] = -0.7 * table.offsets[0] * table.normals
-        first = np.floor(draws.uniform(0.0, self.sides))
-        starts.serve(draws, state, 0, self._toward(first))
+        first = np.floor(rng.uniform(0.0, self.sides))
+        starts.serve(rng, state, 0, self._toward(first))
         return state, {
             **rewards.no_touches(worlds, self.sides, 1),
             "lives": np.full((worlds, self.sides), float(self.lives)),
@@ -76,12 +82,12 @@ class FreeForAll(Scenario):
         """(W,) headings from the centre to sides, rad."""
         return np.asarray(np.pi + 2.0 * np.pi * side / self.sides)
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         lost = after.crossed[..., 0, :] & (memory["lives"] > 0.0)
         lives = memory["lives"] - lost
-        held = rewards.held(self.cast, memory["held"], before, after)
+        held = rewards.held(self.scene, memory["held"], before, after)
         lying = rewards.lying(memory["lying"], held, before, after)
         foul = (held[..., 0] >= self.possession - 1e-9) & (lives > 0.0)
         dead = (lying[..., 0] >= 1.0 - 1e-9) & ~lost.any(-1)
@@ -113,18 +119,18 @@ class FreeForAll(Scenario):
         return follower
 
     @property
-    def observation(self) -> tuple[Piece, ...]:
+    def observation(self) -> tuple[Observable, ...]:
         return (
-            views.Own(),
-            views.Others(),
-            views.Pucks(),
-            views.PucksFromOwn(),
-            views.Held(self.possession),
-            views.Tally("lives", self.lives),
+            observables.OwnPaddle(),
+            observables.OtherPaddles(),
+            observables.Pucks(),
+            observables.OwnToPucks(),
+            observables.PossessionTime(self.possession),
+            observables.PerSeat("lives", self.lives),
         )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         lost = old["lives"] - new["lives"]
         own = 1.0 + np.arange(self.sides)
@@ -135,14 +141,14 @@ class FreeForAll(Scenario):
         return np.asarray((1.0 * (memory["lives"] > 0.0)).sum(-1) <= 1.0)
 
     def restart(
-        self, draws: Draws, after: State, memory: Memory
+        self, rng: RandomStreams, after: State, memory: Memory
     ) -> tuple[Array, State, Memory] | None:
         worlds = np.flatnonzero(memory["serve"] >= 0.0)
         if not len(worlds):
             return None
         rows = after.map(lambda x: x[worlds])
         toward = self._toward(memory["serve"][worlds])
-        starts.serve(draws.select(worlds), rows, 0, toward)
+        starts.serve(rng.select(worlds), rows, 0, toward)
         return worlds, rows, {name: value[worlds] for name, value in memory.items()}
 
     def retired(self, memory: Memory) -> Array | None:

@@ -7,13 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.rewards import length
-from marl_airhockey.scenario import GoalScenario, Mark
-from marl_airhockey.shots import legal_shots
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.toolkit.shots import legal_shots
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,14 +38,14 @@ class HitGoalVelocity(GoalScenario):
     """m/s: this much more."""
 
     @cached_property
-    def cast(self) -> Cast:
-        home = Mouth("home", 0)
+    def scene(self) -> Scene:
+        home = GoalLine("home", 0)
         seats = (self.seat(),)
-        return Cast(self.table_geometry, seats, pucks=1, mouths=(home,), path=True)
+        return Scene(self.table_geometry, seats, pucks=1, goal_lines=(home,), path=True)
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
-        puck, goal = legal_shots(draws, self.cast)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
+        puck, goal = legal_shots(rng, self.scene)
         state.position[:, 1], state.velocity[:, 1] = puck[:, :2], puck[:, 2:]
         return state, {
             **rewards.no_touches(worlds, 1, 1),
@@ -53,8 +56,8 @@ class HitGoalVelocity(GoalScenario):
             "entered": np.zeros(worlds, np.bool_),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         entered, gap, error = rewards.enters(
             memory,
@@ -76,16 +79,16 @@ class HitGoalVelocity(GoalScenario):
         }
 
     observation = (
-        views.Own(),
-        views.Pucks(),
-        views.PucksFromOwn(),
-        views.Touched(),
-        views.Goal((0.3, 0.2), 0.31, "puck"),
-        views.GoalVelocity(2.5, 0.6),
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+        observables.Goal((0.3, 0.2), 0.31, "puck"),
+        observables.GoalVelocity(2.5, 0.6),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "approach": (old["gap"] - new["gap"])[..., None],

@@ -7,11 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.scenario import Mark, Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,34 +34,34 @@ class Juggle(Scenario):
     """Hits that make a success."""
 
     @cached_property
-    def cast(self) -> Cast:
-        home = Mouth("home", 0)
+    def scene(self) -> Scene:
+        home = GoalLine("home", 0)
         seats = (self.seat(),)
-        return Cast(self.table_geometry, seats, pucks=self.pucks, mouths=(home,))
+        return Scene(self.table_geometry, seats, pucks=self.pucks, goal_lines=(home,))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        return starts.falling(draws, self.cast), {
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        return starts.falling(rng, self.scene), {
             **rewards.no_touches(worlds, 1, self.pucks),
             **rewards.no_lifts(worlds, self.pucks),
             "hits": np.zeros(worlds),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         lifts, risen = rewards.lifts(memory, before, after, self.lift)
         return {**lifts, "hits": memory["hits"] + risen.sum(-1)}
 
     observation = (
-        views.Own(),
-        views.Pucks(),
-        views.PucksFromOwn(),
-        views.Recall("armed", 0.0, 1.0, 1.0),
-        views.Recall("struck_at", -1.0, 1.0, 1.0, from_own=True),
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.FromMemory("armed", 0.0, 1.0, 1.0),
+        observables.FromMemory("struck_at", -1.0, 1.0, 1.0, from_own=True),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "hit": (new["hits"] - old["hits"])[..., None],

@@ -8,12 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.rewards import length
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,27 +32,27 @@ class MoveBlock(Scenario):
     """Shape of the block."""
 
     @cached_property
-    def cast(self) -> Cast:
-        return Cast(
+    def scene(self) -> Scene:
+        return Scene(
             self.table_geometry,
             (self.seat(),),
             pucks=1,
             blocks=1,
             block_shape=self.shape,
-            mouths=(Mouth("home", 0),),
+            goal_lines=(GoalLine("home", 0),),
         )
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
 
-        def sample(some: Draws) -> Array:
+        def sample(some: RandomStreams) -> Array:
             return starts.place(some, (0.05, 0.70), (-0.229, 0.229))
 
         def aside(rows: Array) -> Array:
             # The puck must not fall onto the block.
             return np.asarray(np.abs(rows[:, 1] - state.puck[:, 0, 1]) >= 0.09)
 
-        state.block[:, 0] = starts.redraw(draws, sample, aside)
+        state.block[:, 0] = starts.redraw(rng, sample, aside)
         return state, {
             **rewards.no_touches(worlds, 1, 1),
             "gap": starts.puck_gap(state),
@@ -59,8 +61,8 @@ class MoveBlock(Scenario):
             "moved": np.zeros(worlds),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         touched, block = rewards.touched(memory), after.block[..., 0, :]
         fresh = touched & np.isinf(memory["near"])
@@ -77,16 +79,16 @@ class MoveBlock(Scenario):
         }
 
     observation = (
-        views.Own(),
-        views.Pucks(),
-        views.PucksFromOwn(),
-        views.Touched(),
-        views.Blocks(0.4),
-        views.BlocksFromPuck(),
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+        observables.Blocks(0.4),
+        observables.PuckToBlocks(),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "approach": (old["gap"] - new["gap"])[..., None],

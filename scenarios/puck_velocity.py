@@ -7,11 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,20 +25,20 @@ class PuckVelocity(Scenario):
     """m/s: wanted upward speed."""
 
     @cached_property
-    def cast(self) -> Cast:
-        home = Mouth("home", 0)
-        return Cast(self.table_geometry, (self.seat(),), pucks=1, mouths=(home,))
+    def scene(self) -> Scene:
+        home = GoalLine("home", 0)
+        return Scene(self.table_geometry, (self.seat(),), pucks=1, goal_lines=(home,))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
         return state, {
             **rewards.no_touches(worlds, 1, 1),
             "gap": starts.puck_gap(state),
             "rise": np.zeros(worlds),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         rise = after.puck_velocity[..., 0, 0] * rewards.touched(memory)
         return {
@@ -44,10 +46,15 @@ class PuckVelocity(Scenario):
             "rise": np.maximum(memory["rise"], rise),
         }
 
-    observation = (views.Own(), views.Pucks(), views.PucksFromOwn(), views.Touched())
+    observation = (
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+    )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "approach": (old["gap"] - new["gap"])[..., None],

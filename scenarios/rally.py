@@ -7,11 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast
-from marl_airhockey.draws import Draws
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,22 +34,22 @@ class Rally(Scenario):
     jitter_weight: float = 0.0
 
     @cached_property
-    def cast(self) -> Cast:
+    def scene(self) -> Scene:
         seats = self.seat(0, (2,)), self.seat(2, (0,))
-        return Cast(self.table_geometry, seats, pucks=1, physics={"tilt": 0.0})
+        return Scene(self.table_geometry, seats, pucks=1, physics={"tilt": 0.0})
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.first_state(self.cast, worlds)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.first_state(self.scene, worlds)
         state.paddle[..., 0] = 0.7 * self.table_geometry.offsets[0] * np.array([-1, 1])
-        toward = np.where(draws.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
-        starts.serve(draws, state, 0, toward)
+        toward = np.where(rng.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
+        starts.serve(rng, state, 0, toward)
         names = ("toucher", "counted", "crossings", "idle")
         none = {name: np.zeros(worlds) for name in names}
         touches = rewards.no_touches(worlds, 2, 1)
         return state, {**touches, **none, "strikes": touches["touches"].copy()}
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         old = memory["toucher"]
         fresh = (memory["touches"] > memory["strikes"])[..., 0]
@@ -69,16 +71,16 @@ class Rally(Scenario):
         }
 
     observation = (
-        views.Own(),
-        views.Others(),
-        views.Pucks(),
-        views.PucksFromOwn(),
-        views.Mine("toucher"),
-        views.Mine("counted"),
+        observables.OwnPaddle(),
+        observables.OtherPaddles(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.IsThisSeat("toucher"),
+        observables.IsThisSeat("counted"),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         counted = new["crossings"] - old["crossings"]
         return {"crossing": counted[..., None] * np.ones(2)}

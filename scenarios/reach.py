@@ -7,12 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import starts, views
-from marl_airhockey.cast import Cast
-from marl_airhockey.draws import Draws
-from marl_airhockey.rewards import length
-from marl_airhockey.scenario import GoalScenario, Mark
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,18 +32,18 @@ class Reach(GoalScenario):
     """m: shortest distance of a goal from the paddle."""
 
     @cached_property
-    def cast(self) -> Cast:
-        return Cast(self.table_geometry, (self.seat(),))
+    def scene(self) -> Scene:
+        return Scene(self.table_geometry, (self.seat(),))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
         paddle = state.paddle[:, 0]
 
-        def sample(some: Draws) -> Array:
-            return starts.inside(some, self.cast, 0)
+        def sample(some: RandomStreams) -> Array:
+            return starts.inside(some, self.scene, 0)
 
         goal = starts.redraw(
-            draws, sample, lambda rows: length(rows - paddle) >= self.far
+            rng, sample, lambda rows: length(rows - paddle) >= self.far
         )
         return state, {
             "goal": goal,
@@ -50,8 +53,8 @@ class Reach(GoalScenario):
             "held": np.zeros(worlds, np.int64),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         here = after.paddle[..., 0, :]
         gap = length(here - memory["goal"])
@@ -62,10 +65,10 @@ class Reach(GoalScenario):
             "held": np.where(gap < self.radius, memory["held"] + 1, 0),
         }
 
-    observation = (views.Own(), views.Goal((0.2, 0.2), -0.55, "own"))
+    observation = (observables.OwnPaddle(), observables.Goal((0.2, 0.2), -0.55, "own"))
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "progress": 2.0 * (old["gap"] - new["gap"])[..., None],

@@ -7,12 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import starts, views
-from marl_airhockey.cast import Cast
-from marl_airhockey.draws import Draws
-from marl_airhockey.rewards import length, tolerance
-from marl_airhockey.scenario import GoalScenario, Mark
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import starts
+from marl_airhockey.toolkit.rewards import tolerance
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,14 +39,14 @@ class ReachVelocity(GoalScenario):
     """m: distance of a goal from every edge of the reach."""
 
     @cached_property
-    def cast(self) -> Cast:
-        return Cast(self.table_geometry, (self.seat(),))
+    def scene(self) -> Scene:
+        return Scene(self.table_geometry, (self.seat(),))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
-        goal = starts.inside(draws, self.cast, 0, self.margin)
-        angle = draws.uniform(-np.pi, np.pi)
-        speed = draws.uniform(self.slow, self.fast)[:, None]
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
+        goal = starts.inside(rng, self.scene, 0, self.margin)
+        angle = rng.uniform(-np.pi, np.pi)
+        speed = rng.uniform(self.slow, self.fast)[:, None]
         velocity = speed * np.stack([np.cos(angle), np.sin(angle)], -1)
         gap = length(state.paddle[:, 0] - goal)
         return state, {
@@ -53,8 +57,8 @@ class ReachVelocity(GoalScenario):
             "passed": np.zeros(worlds, np.bool_),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         gap = length(after.paddle[..., 0, :] - memory["goal"])
         error = length(after.paddle_velocity[..., 0, :] - memory["goal_velocity"])
@@ -66,13 +70,13 @@ class ReachVelocity(GoalScenario):
         }
 
     observation = (
-        views.Own(),
-        views.Goal((0.2, 0.2), -0.55, "own"),
-        views.GoalVelocity(1.0, 0.5),
+        observables.OwnPaddle(),
+        observables.Goal((0.2, 0.2), -0.55, "own"),
+        observables.GoalVelocity(1.0, 0.5),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "progress": (old["gap"] - new["gap"])[..., None],
@@ -89,7 +93,7 @@ class ReachVelocity(GoalScenario):
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:
-        top = 1.5 * self.cast.seats[0].speed
+        top = 1.5 * self.scene.seats[0].speed
         return (*self.table_geometry.size / 2, top, top)
 
     def achieved(self, state: State, memory: Memory) -> Array:

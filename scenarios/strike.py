@@ -7,12 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast
-from marl_airhockey.draws import Draws
-from marl_airhockey.rewards import length
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,14 +32,14 @@ class Strike(Scenario):
     """m: wanted distance from where it lay."""
 
     @cached_property
-    def cast(self) -> Cast:
+    def scene(self) -> Scene:
         flat = {"tilt": 0.0}
-        return Cast(self.table_geometry, (self.seat(),), pucks=1, physics=flat)
+        return Scene(self.table_geometry, (self.seat(),), pucks=1, physics=flat)
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.first_state(self.cast, worlds)
-        state.position[:, 0] = starts.place(draws, (-0.74, -0.64), starts.PADDLE_Y)
-        state.position[:, 1] = starts.place(draws, (-0.49, -0.32), (-0.20, 0.20))
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.first_state(self.scene, worlds)
+        state.position[:, 0] = starts.place(rng, (-0.74, -0.64), starts.PADDLE_Y)
+        state.position[:, 1] = starts.place(rng, (-0.49, -0.32), (-0.20, 0.20))
         return state, {
             **rewards.no_touches(worlds, 1, 1),
             "gap": starts.puck_gap(state),
@@ -46,8 +48,8 @@ class Strike(Scenario):
             "struck": np.zeros(worlds, np.bool_),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         speed = length(after.puck_velocity[..., 0, :])
         away = length(after.puck[..., 0, :] - memory["origin"]) >= self.way
@@ -57,10 +59,15 @@ class Strike(Scenario):
             "struck": memory["struck"] | (away & (speed >= self.fast)),
         }
 
-    observation = (views.Own(), views.Pucks(), views.PucksFromOwn(), views.Touched())
+    observation = (
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+    )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "approach": (old["gap"] - new["gap"])[..., None],

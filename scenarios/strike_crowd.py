@@ -8,12 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast
-from marl_airhockey.draws import Draws
-from marl_airhockey.rewards import length
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 ROWS = 5
 GAP = 0.004
@@ -34,8 +36,8 @@ class StrikeCrowd(Scenario):
     """Shape of the blocks."""
 
     @cached_property
-    def cast(self) -> Cast:
-        return Cast(
+    def scene(self) -> Scene:
+        return Scene(
             self.table_geometry,
             (self.seat(),),
             pucks=1,
@@ -45,11 +47,11 @@ class StrikeCrowd(Scenario):
             physics={"tilt": 0.0, "block_friction": 0.5},
         )
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.first_state(self.cast, worlds)
-        state.position[:, 0] = starts.place(draws, (-0.74, -0.64), starts.PADDLE_Y)
-        state.position[:, 1] = starts.place(draws, (-0.49, -0.32), (-0.10, 0.10))
-        pitch = 2 * self.cast.block_radius + GAP
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.first_state(self.scene, worlds)
+        state.position[:, 0] = starts.place(rng, (-0.74, -0.64), starts.PADDLE_Y)
+        state.position[:, 1] = starts.place(rng, (-0.49, -0.32), (-0.10, 0.10))
+        pitch = 2 * self.scene.block_radius + GAP
         lift = 0.87 * pitch if self.shape == "disc" else pitch
         triangle = np.array(
             [
@@ -58,7 +60,7 @@ class StrikeCrowd(Scenario):
                 for k in range(row + 1)
             ]
         )
-        middle = draws.uniform(-0.10, 0.10)
+        middle = rng.uniform(-0.10, 0.10)
         state.block[:] = triangle
         state.block[..., 1] += middle[:, None]
         return state, {
@@ -69,8 +71,8 @@ class StrikeCrowd(Scenario):
             "rise": np.zeros(worlds),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         spread = length(after.block - memory["origin"]).sum(-1)
         rise = after.puck_velocity[..., 0, 0] * rewards.touched(memory)
@@ -81,15 +83,15 @@ class StrikeCrowd(Scenario):
         }
 
     observation = (
-        views.Own(),
-        views.Pucks(),
-        views.PucksFromOwn(),
-        views.Touched(),
-        views.Blocks(0.35),
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+        observables.Blocks(0.35),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "approach": (old["gap"] - new["gap"])[..., None],

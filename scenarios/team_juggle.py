@@ -7,12 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.scenario import Mark, Scenario
-from marl_airhockey.state import Array, Memory, State
-from marl_airhockey.table import Seat, clip
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.geometry import clip
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.seat import Seat
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +38,10 @@ class TeamJuggle(Scenario):
     """m between the reaches of the seats."""
 
     @cached_property
-    def cast(self) -> Cast:
-        home = Mouth("home", 0)
+    def scene(self) -> Scene:
+        home = GoalLine("home", 0)
         seats = self._half(1.0), self._half(-1.0)
-        return Cast(self.table_geometry, seats, pucks=self.pucks, mouths=(home,))
+        return Scene(self.table_geometry, seats, pucks=self.pucks, goal_lines=(home,))
 
     def _half(self, side: float) -> Seat:
         seat = self.seat()
@@ -45,8 +49,8 @@ class TeamJuggle(Scenario):
         half = clip(np.asarray(seat.reach), normal, -self.gap / 2)
         return replace(seat, reach=tuple((float(x), float(y)) for x, y in half))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
         state.paddle[:] = [(-0.65, 0.15), (-0.65, -0.15)]
         return state, {
             **rewards.no_touches(worlds, 2, self.pucks),
@@ -56,8 +60,8 @@ class TeamJuggle(Scenario):
             "passes": np.zeros(worlds),
         }
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         lifts, risen = rewards.lifts(memory, before, after, self.lift)
         striker = rewards.last_toucher(memory["striker"], after)
@@ -71,18 +75,18 @@ class TeamJuggle(Scenario):
         }
 
     observation = (
-        views.Own(),
-        views.Others(),
-        views.Pucks(),
-        views.PucksFromOwn(),
-        views.Recall("armed", 0.0, 1.0, 1.0),
-        views.Recall("struck_at", -1.0, 1.0, 1.0, from_own=True),
-        views.Mine("striker"),
-        views.Mine("passer"),
+        observables.OwnPaddle(),
+        observables.OtherPaddles(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.FromMemory("armed", 0.0, 1.0, 1.0),
+        observables.FromMemory("struck_at", -1.0, 1.0, 1.0, from_own=True),
+        observables.IsThisSeat("striker"),
+        observables.IsThisSeat("passer"),
     )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         passed = new["passes"] - old["passes"]
         return {"pass": passed[..., None] * np.ones(2)}

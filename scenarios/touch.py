@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.draws import Draws
-from marl_airhockey.scenario import Scenario
-from marl_airhockey.state import Array, Memory, State
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,24 +24,29 @@ class Touch(Scenario):
     seconds: float = 5.0
 
     @cached_property
-    def cast(self) -> Cast:
-        home = Mouth("home", 0)
-        return Cast(self.table_geometry, (self.seat(),), pucks=1, mouths=(home,))
+    def scene(self) -> Scene:
+        home = GoalLine("home", 0)
+        return Scene(self.table_geometry, (self.seat(),), pucks=1, goal_lines=(home,))
 
-    def start(self, draws: Draws, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(draws, self.cast)
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
         memory = rewards.no_touches(worlds, 1, 1)
         return state, {**memory, "gap": starts.puck_gap(state)}
 
-    def remember(
-        self, memory: Memory, before: State, sent: Array, after: State
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
     ) -> Memory:
         return {"gap": rewards.nearest(memory, after)}
 
-    observation = (views.Own(), views.Pucks(), views.PucksFromOwn(), views.Touched())
+    observation = (
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+    )
 
     def reward_terms(
-        self, before: State, sent: Array, after: State, old: Memory, new: Memory
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
     ) -> dict[str, Array]:
         return {
             "approach": (old["gap"] - new["gap"])[..., None],

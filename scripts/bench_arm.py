@@ -19,20 +19,21 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.backend import Command
-from marl_airhockey.cast import Cast
+from marl_airhockey.contracts.backend import Command
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
-from marl_airhockey.starts import first_state
-from marl_airhockey.table import TABLES, make_seat
+from marl_airhockey.toolkit.starts import first_state
 
 Step = Callable[[], object]
 
 
-def cast(arms: int) -> Cast:
+def scene(arms: int) -> Scene:
     """A puck and one arm at home, or two."""
     table = TABLES["standard"]
     seats = tuple(make_seat("robot", table, side) for side in (0, 2)[:arms])
-    return Cast(table, seats, pucks=1)
+    return Scene(table, seats, pucks=1)
 
 
 def lift() -> Step:
@@ -57,9 +58,9 @@ def lift() -> Step:
 
 def stepped_by_robosuite(arms: int, timestep: float) -> Step:
     """Our environment, its own steps."""
-    from marl_airhockey.arm.robot import AirHockey
+    from marl_airhockey.backends.robosuite.env import AirHockey
 
-    env: Any = AirHockey(cast=cast(arms), timestep=timestep)
+    env: Any = AirHockey(scene=scene(arms), timestep=timestep)
     env.reset()
     rng = np.random.default_rng(0)
     return lambda: env.step(rng.uniform(-1, 1, env.action_dim))
@@ -67,7 +68,7 @@ def stepped_by_robosuite(arms: int, timestep: float) -> Step:
 
 def lean(arms: int, timestep: float) -> Step:
     """The backend's steps; limits are the world's and not part of it."""
-    who = cast(arms)
+    who = scene(arms)
     backend = find_backend("robosuite")(who, 1, 0.05, round(0.05 / timestep))
     state = first_state(who, 1)
     for i, hand in enumerate(backend.env.hands):  # type: ignore[attr-defined]

@@ -24,12 +24,12 @@ from rich.console import Console
 from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
-from marl_airhockey.learn.arena import environment
-from marl_airhockey.learn.batch_runner import RUNNER_CPU
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.keeper import Rate
-from marl_airhockey.learn.ppo import build
 from marl_airhockey.learn.rllib import algorithm, start_ray
+from marl_airhockey.learn.rllib_runner import RUNNER_CPU
+from marl_airhockey.learn.sb3 import build
+from marl_airhockey.learn.sb3_callback import Rate
+from marl_airhockey.learn.self_play import environment
 
 
 class Turn(NamedTuple):

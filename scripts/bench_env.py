@@ -36,7 +36,7 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.backends.pymunk import Pymunk
+from marl_airhockey.backends.pymunk.backend import Pymunk
 
 Play = Callable[[], int]
 """Steps for a moment and says how many env-steps that were."""
@@ -196,13 +196,13 @@ def jaxmarl(scenario: str, number: int, length: int) -> Made:
     def advance(last: Any, row: Any) -> Any:
         return step(row[0], last[1], row[1])[:4], None
 
-    scan = jax.jit(partial(jax.lax.scan, advance))
+    replay_memory = jax.jit(partial(jax.lax.replay_memory, advance))
     _, state = jax.vmap(env.reset)(jax.random.split(start, number))
     last = step(keys[0], state, {a: rows[0] for a, rows in actions.items()})[:4]
 
     def play() -> int:
         nonlocal last
-        last = jax.block_until_ready(scan(last, (keys, actions)))[0]
+        last = jax.block_until_ready(replay_memory(last, (keys, actions)))[0]
         return length * number
 
     return play, env.num_agents
@@ -324,11 +324,11 @@ def rows(
     few = f"ours, {PYMUNK_WORLDS} worlds, pymunk"
     here: list[tuple[str, str, Callable[[], Made]]] = [
         ("ours, dict env, pymunk", "env-steps", lambda: ours(scenario, "pymunk")),
-        ("ours, dict env, batched", "env-steps", lambda: ours(scenario, "batched")),
+        ("ours, dict env, batched", "env-steps", lambda: ours(scenario, "numba")),
         ("bare cpSpaceStep", "env-steps", lambda: bare(scenario)),
         ("multiwalker", "env-steps", multiwalker),
         ("mpe2 simple_tag", "env-steps", simple_tag),
-        (many, "agent-steps", lambda: worlds(scenario, "batched", WORLDS)),
+        (many, "agent-steps", lambda: worlds(scenario, "numba", WORLDS)),
         (few, "agent-steps", lambda: worlds(scenario, "pymunk", PYMUNK_WORLDS)),
     ]
     for name, unit, make in here:
@@ -351,8 +351,8 @@ def rows(
 def show(found: list[dict[str, Any]], title: str) -> Table:
     """A table with a line between what is compared in env-steps and in agent-steps."""
     ours = {row["compared"]: row["ours"] for row in found}
-    told = "; ".join(f"{unit} of {name}" for unit, name in ours.items())
-    table = Table("", title=title, caption=f"ours: {told}")
+    units = "; ".join(f"{unit} of {name}" for unit, name in ours.items())
+    table = Table("", title=title, caption=f"ours: {units}")
     heads = ("env-steps\nper CPU-s", "agent-steps\nper CPU-s", "agents", "spread")
     for head in (*heads, "ours / this", "per round"):
         table.add_column(head, justify="right")

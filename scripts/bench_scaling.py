@@ -21,13 +21,14 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.backend import Command
-from marl_airhockey.cast import Cast
-from marl_airhockey.charts import DPI, INK, INKS, save, tidy
-from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.contracts.backend import Command
+from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.registry import find_backend
-from marl_airhockey.starts import first_state
-from marl_airhockey.table import TABLES, make_seat
+from marl_airhockey.toolkit.starts import first_state
 
 Play = Callable[[], tuple[float, int]]
 """Steps for a moment: CPU-seconds and calls."""
@@ -45,7 +46,7 @@ AIM = np.pi / 6
 
 def whole(worlds: int) -> Play:
     """Env-steps of `juggle`: physics, rules, observations and restarts."""
-    world = ah.make_world("juggle", worlds, backend="batched")
+    world = ah.make_world("juggle", worlds, backend="numba")
     world.reset(0)
     drawn = np.random.default_rng(0).uniform(-1, 1, (16, worlds, 1, 2))
     for k in range(100):  # compiles, and lets episodes fall out of step
@@ -70,13 +71,13 @@ def physics(
     """
     table = TABLES["full_size"]
     seats = (make_seat("arcade", table, side=0),) * paddles
-    cast = Cast(table, seats, pucks=pucks, blocks=blocks, block_radius=0.0277)
-    kind = find_backend("batched")
-    backend = kind(cast, BATCH, 0.05, kind.default_substeps)
+    scene = Scene(table, seats, pucks=pucks, blocks=blocks, block_radius=0.0277)
+    kind = find_backend("numba")
+    backend = kind(scene, BATCH, 0.05, kind.default_substeps)
     everywhere = np.arange(BATCH)
     values = {name: np.full(BATCH, p.default) for name, p in PARAMETERS.items()}
     backend.set_physics({**values, "tilt": np.zeros(BATCH)}, everywhere)
-    state, rng = first_state(cast, BATCH), np.random.default_rng(0)
+    state, rng = first_state(scene, BATCH), np.random.default_rng(0)
     state.position[:] = PADDLES[:paddles] + PUCKS[:pucks] + BLOCKS[:blocks]
     angle = rng.uniform(-spread, spread, (BATCH, pucks))
     speed = top * rng.uniform(0.8, 1.2, (BATCH, pucks, 1))

@@ -13,8 +13,8 @@ import numpy as np
 import typer
 
 import marl_airhockey as ah
-from marl_airhockey.render import Renderer, draw
-from marl_airhockey.state import Array
+from marl_airhockey.render.renderer import Renderer, draw
+from marl_airhockey.types import Array
 
 COLUMNS = 2
 MOMENT = 1.9
@@ -25,7 +25,7 @@ WIDE = 1.5
 
 def moment(name: str, width: int) -> Array:
     """A picture of a scenario with scripts in all seats."""
-    seats = ah.make_scenario(name).cast.seats
+    seats = ah.make_scenario(name).scene.seats
     driver = "allround" if len(seats) > 1 else "striker"
     driver = "reacher" if name.startswith("reach") else driver
     drivers = {f"paddle_{i}": driver for i in range(len(seats))}
@@ -38,8 +38,8 @@ def moment(name: str, width: int) -> Array:
         step = world.step(np.zeros((1, 0, 2)))
         over = bool(step.terminated[0] or step.truncated[0])
         renderer.follow()
-    x, y = world.cast.table.size
-    return draw(renderer.scene(), width if x > WIDE * y else round(0.54 * width))
+    x, y = world.scene.table.size
+    return draw(renderer.frame(), width if x > WIDE * y else round(0.54 * width))
 
 
 def sheet(pictures: list[Array], width: int) -> Array:
@@ -65,7 +65,7 @@ def main(
     out.mkdir(parents=True, exist_ok=True)
     kinds: dict[str, list[Array]] = {"tasks": [], "games": []}
     for name in ah.scenario_names():
-        alone = len(ah.make_scenario(name).cast.seats) == 1
+        alone = len(ah.make_scenario(name).scene.seats) == 1
         kinds["tasks" if alone else "games"].append(moment(name, width))
     for kind, pictures in kinds.items():
         picture = cv2.cvtColor(sheet(pictures, width), cv2.COLOR_RGB2BGR)

@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.limits import Reach
-from marl_airhockey.state import Array
-from marl_airhockey.world import World
+from marl_airhockey.core.seat import ReachPlanes
+from marl_airhockey.types import Array
+from marl_airhockey.world.world import World
 
 LIMIT = 0.9 * np.pi
 """rad/s, of a joint"""
@@ -90,7 +90,7 @@ def main(
             scenario, seeds, backend="robosuite", profile=profile, **keywords
         )
         world.reset(0)
-        reach = Reach.of(world.cast.table, world.cast.seats)
+        reach = ReachPlanes.of(world.scene.table, world.scene.seats)
         ask, trace, beyond = rule(0), [], 0.0
         for k in range(steps):
             world.step(ask(k, world))

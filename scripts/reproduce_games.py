@@ -22,21 +22,21 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.charts import DPI, INK, INKS, curve, save, tidy
-from marl_airhockey.contest import challenge
-from marl_airhockey.driver import Driver
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, curve, save, tidy
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.stats import bootstrap, interval
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train
-from marl_airhockey.make import Keywords
-from marl_airhockey.match import evaluate
 from marl_airhockey.registry import make_driver
-from marl_airhockey.stats import bootstrap, interval
+from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.world.build import Keywords
 
 TOGETHER = ("rally", "team_juggle")
 SEEN = ("random", "striker", "allround", "allround:strength=fair")
 UNSEEN = ("goalkeeper", "striker:strength=fair", "allround:strength=weak")
-BATCHED: Keywords = {"backend": "batched"}
+BATCHED: Keywords = {"backend": "numba"}
 GAMES, SEED = 400, 5_000_000
 
 

@@ -25,13 +25,13 @@ from rich.console import Console
 from rich.table import Table
 
 from marl_airhockey import make_agent
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.plots import seed_curves
-from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train
-from marl_airhockey.make import Keywords
-from marl_airhockey.match import evaluate
-from marl_airhockey.stats import interval
+from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.world.build import Keywords
 
 PAPER = {
     "reach": 1.0,
@@ -56,7 +56,7 @@ def run(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
         return dict(json.loads(result.read_text()))
     config = preset(scenario, {"seed": seed, "profile": profile})
     train(None if (folder / "config.toml").exists() else config, folder)
-    here: Keywords = {"profile": profile, "backend": "batched"}
+    here: Keywords = {"profile": profile, "backend": "numba"}
     there: Keywords = {"profile": profile, "backend": "pymunk"}
     late: Keywords = {**here, "physics": {"action_delay": 0.05}}
     cases = {
@@ -94,7 +94,7 @@ def evaluations(folder: Path) -> list[dict[str, str]]:
 
 def floors(scenario: str, profile: str) -> dict[str, float]:
     """Success of the drivers that know nothing."""
-    keywords: Keywords = {"profile": profile, "backend": "batched"}
+    keywords: Keywords = {"profile": profile, "backend": "numba"}
     return {
         name: evaluate(make_agent(name), name, scenario, EPISODES, 0, keywords).success
         for name in ("still", "random", "sticky")

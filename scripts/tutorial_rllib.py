@@ -27,15 +27,15 @@ from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune.registry import register_env
 
 import marl_airhockey as ah
-from marl_airhockey.contest import challenge
-from marl_airhockey.learn.policy import Policy
+from marl_airhockey.evaluation.games import challenge
 from marl_airhockey.learn.rllib import start_ray
 from marl_airhockey.registry import make_driver
+from marl_airhockey.toolkit.policies import Policy
 
 
 def environment(_: Any) -> ParallelPettingZooEnv:
     """A duel of 20 s as RLlib wants it."""
-    env = ah.parallel_env("duel", backend="batched", options={"seconds": 20.0})
+    env = ah.parallel_env("duel", backend="numba", options={"seconds": 20.0})
     return ParallelPettingZooEnv(env)
 
 
@@ -96,7 +96,7 @@ def main(
     algorithm.stop()
     rivals = [make_driver("random")]
     score, _ = challenge(
-        "duel", reload(checkpoint, "p0"), rivals, games, 0, {"backend": "batched"}
+        "duel", reload(checkpoint, "p0"), rivals, games, 0, {"backend": "numba"}
     )
     print(f"{checkpoint}: p0 as a driver scores {score[0]:.3f} against random")
     ray.shutdown()

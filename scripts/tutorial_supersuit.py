@@ -21,9 +21,9 @@ import typer
 from stable_baselines3 import PPO
 
 import marl_airhockey as ah
-from marl_airhockey.contest import challenge
-from marl_airhockey.learn.policy import Policy
+from marl_airhockey.evaluation.games import challenge
 from marl_airhockey.registry import make_driver
+from marl_airhockey.toolkit.policies import Policy
 
 
 def environment(copies: int) -> Any:
@@ -32,7 +32,7 @@ def environment(copies: int) -> Any:
         # SuperSuit still asks gymnasium for names that it is going to drop.
         warnings.simplefilter("ignore")
         import supersuit
-    env = ah.parallel_env("duel", backend="batched", options={"seconds": 20.0})
+    env = ah.parallel_env("duel", backend="numba", options={"seconds": 20.0})
     slots = supersuit.pettingzoo_env_to_vec_env_v1(env)
     base = "stable_baselines3"
     return supersuit.concat_vec_envs_v1(slots, copies, num_cpus=0, base_class=base)
@@ -65,7 +65,7 @@ def main(
 
     rivals = [make_driver("random")]
     score, margin = challenge(
-        "duel", Policy(predict), rivals, games, 0, {"backend": "batched"}
+        "duel", Policy(predict), rivals, games, 0, {"backend": "numba"}
     )
     print(f"{model.num_timesteps:,} agent-steps at {rate:,.0f} per second")
     print(f"score against random: {score[0]:.3f} ({margin[0]:+.2f} goals a game)")

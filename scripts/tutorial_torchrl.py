@@ -59,7 +59,7 @@ class WithoutInfos(BaseParallelWrapper[Any, Any, Any]):  # type: ignore[misc]
 
 def environment() -> TransformedEnv:
     """A rally as TorchRL wants it, with the return of episodes."""
-    raw = ah.parallel_env("rally", backend="batched")
+    raw = ah.parallel_env("rally", backend="numba")
     env = PettingZooWrapper(
         WithoutInfos(raw),
         return_state=True,

@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from marl_airhockey.backend import Command
-from marl_airhockey.cast import Cast
-from marl_airhockey.physics import PARAMETERS
+from marl_airhockey.contracts.backend import Command
+from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
-from marl_airhockey.starts import first_state
-from marl_airhockey.table import TABLES, make_seat
+from marl_airhockey.toolkit.starts import first_state
 
 TABLE = TABLES["standard"]
 DT = 0.05
@@ -19,18 +20,18 @@ FLAT = {name: p.default for name, p in PARAMETERS.items()} | {
 
 
 class Bench:
-    def __init__(self, backend, physics=None, pucks=1, table=TABLE, **cast):
-        self.cast = Cast(table, (make_seat("robot", table, 0),), pucks=pucks, **cast)
+    def __init__(self, backend, physics=None, pucks=1, table=TABLE, **scene):
+        self.scene = Scene(table, (make_seat("robot", table, 0),), pucks=pucks, **scene)
         kind = find_backend(backend)
-        self.refused = kind.supports(self.cast)
-        self.backend = kind(self.cast, 1, DT, kind.default_substeps)
+        self.refused = kind.supports(self.scene)
+        self.backend = kind(self.scene, 1, DT, kind.default_substeps)
         values = FLAT | (physics or {})
         rows = {name: np.full(1, value) for name, value in values.items()}
         self.backend.set_physics(rows, np.arange(1))
 
     def start(self, paddle, *others):
         """Place the paddle at (x, y) and the others at (x, y, vx, vy)."""
-        state = first_state(self.cast, 1)
+        state = first_state(self.scene, 1)
         state.position[0, 0] = paddle
         for i, (x, y, vx, vy) in enumerate(others, start=1):
             state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)

@@ -15,7 +15,7 @@ GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
 
 
 def seats(scenario):
-    return len(ah.make_scenario(scenario).cast.seats)
+    return len(ah.make_scenario(scenario).scene.seats)
 
 
 def ideal_backends():

@@ -8,9 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey import rewards, starts, views
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.scenario import Scenario
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,37 +21,44 @@ class Pair(Scenario):
     jitter_weight: float = 0.0
 
     @cached_property
-    def cast(self):
+    def scene(self):
         seats = (self.seat(0, (2,), team=0), self.seat(2, (0,), team=1))
-        mouths = (Mouth("home", 0, 0.30), Mouth("far", 2, 0.30))
+        goal_lines = (GoalLine("home", 0, 0.30), GoalLine("far", 2, 0.30))
         flat = {"tilt": 0.0}
-        return Cast(self.table_geometry, seats, pucks=1, mouths=mouths, physics=flat)
+        return Scene(
+            self.table_geometry, seats, pucks=1, goal_lines=goal_lines, physics=flat
+        )
 
-    def serve(self, draws, worlds):
-        state = starts.first_state(self.cast, worlds)
+    def serve(self, rng, worlds):
+        state = starts.first_state(self.scene, worlds)
         state.position[:, 0], state.position[:, 1] = (-0.5, 0.0), (0.5, 0.0)
-        state.velocity[:, 2] = draws.uniform(-0.5, 0.5, 2)
+        state.velocity[:, 2] = rng.uniform(-0.5, 0.5, 2)
         return state
 
-    def start(self, draws, worlds):
+    def start(self, rng, worlds):
         memory = rewards.no_touches(worlds, 2, 1) | {"goals": np.zeros((worlds, 2))}
-        return self.serve(draws, worlds), memory
+        return self.serve(rng, worlds), memory
 
-    def remember(self, memory, before, sent, after):
+    def update_memory(self, memory, before, command, after):
         scored = after.crossed[..., 0, ::-1]
         return {"goals": memory["goals"] + scored}
 
-    observation = (views.Own(), views.Others(), views.Pucks(), views.PucksFromOwn())
+    observation = (
+        observables.OwnPaddle(),
+        observables.OtherPaddles(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+    )
 
-    def reward_terms(self, before, sent, after, old, new):
+    def reward_terms(self, before, command, after, old, new):
         scored = new["goals"] - old["goals"]
         return {"goal": scored - scored[..., ::-1]}
 
-    def restart(self, draws, after, memory):
+    def restart(self, rng, after, memory):
         worlds = np.flatnonzero(after.crossed[..., 0, :].any(-1))
         if not len(worlds):
             return None
-        state = self.serve(draws.select(worlds), len(worlds))
+        state = self.serve(rng.select(worlds), len(worlds))
         state.time[:] = after.time[worlds]
         # Paddles play on where they are.
         state.paddle[:] = after.paddle[worlds]

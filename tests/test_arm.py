@@ -6,19 +6,21 @@ from bench import DT, FLAT, TABLE, Bench
 from pages import aim, line
 
 import marl_airhockey as ah
-from marl_airhockey.backend import Command
-from marl_airhockey.cast import Cast, Mouth
-from marl_airhockey.play.court import RATE, Court
+from marl_airhockey.contracts.backend import Command
+from marl_airhockey.core.geometry import half_planes
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import GRAVITY
+from marl_airhockey.jit.threads import use_threads
+from marl_airhockey.play.live_match import RATE, Court
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import find_backend
-from marl_airhockey.table import GRAVITY, half_planes, make_seat
-from marl_airhockey.threads import use_threads
 
 mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("robosuite")
 
-from marl_airhockey.arm.law import forget  # noqa: E402
-from marl_airhockey.arm.robot import AirHockey  # noqa: E402
+from marl_airhockey.backends.robosuite.env import AirHockey  # noqa: E402
+from marl_airhockey.backends.robosuite.osc import forget  # noqa: E402
 
 HOME = make_seat("robot", TABLE, 0)
 FASTEST = 0.9 * np.pi
@@ -135,10 +137,10 @@ def test_nothing_escapes():
 
 @pytest.mark.parametrize("tilt", [0.0, 5.5])
 def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
-    from marl_airhockey.arm.pose import reach_for
+    from marl_airhockey.backends.robosuite.inverse_kinematics import reach_for
 
     seats = (HOME, make_seat("robot", TABLE, 2))
-    env = AirHockey(cast=Cast(TABLE, seats, physics={"tilt": tilt}))
+    env = AirHockey(scene=Scene(TABLE, seats, physics={"tilt": tilt}))
     env.reset()
     model, data = env.sim.model._model, env.sim.data._data
     for i, seat in enumerate(seats):
@@ -175,8 +177,8 @@ def test_robosuites_own_steps_are_the_same():
     furthest = 0.0
     for _ in range(40):
         env.step(rng.uniform(-1, 1, 2))
-        sent = env.hands[0].new[None, None]
-        state = bench.backend.step(Command(sent))
+        command = env.hands[0].new[None, None]
+        state = bench.backend.step(Command(command))
         way = env.hands[0]
         mujoco.mj_kinematics(env.sim.model._model, data)
         furthest = max(furthest, np.abs(way.position[:2] - state.paddle[0, 0]).max())
@@ -285,7 +287,7 @@ def test_arms_differ_from_world_to_world():
     np.testing.assert_allclose(stiff, arms.episode.physics["arm_stiffness"])
     assert len(set(stiff)) == 4
     with pytest.raises(ValueError, match=r"'arm_force'. is of arms.*backend='robos"):
-        ah.make_world("juggle", backend="batched", physics={"arm_force": 30.0})
+        ah.make_world("juggle", backend="numba", physics={"arm_force": 30.0})
 
 
 def test_it_is_seen_from_three_cameras():
@@ -340,5 +342,7 @@ def test_what_an_arm_cannot_do_is_refused():
         ah.make_world("juggle", backend="robosuite", substeps=5)
     with pytest.raises(ValueError, match="by as many UR5e"):
         AirHockey(robots="Panda")
-    far = Cast(TABLE, (HOME,), pucks=1, mouths=(Mouth("goal", 2, 0.3),), blocks=1)
-    assert "goal mouth" in find_backend("robosuite").supports(far)
+    far = Scene(
+        TABLE, (HOME,), pucks=1, goal_lines=(GoalLine("goal", 2, 0.3),), blocks=1
+    )
+    assert "goal line" in find_backend("robosuite").supports(far)

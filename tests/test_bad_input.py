@@ -8,9 +8,10 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.cast import Cast
-from marl_airhockey.physics import PARAMETERS
-from marl_airhockey.table import TABLES, Table, make_seat
+from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import TABLES, Table
 
 CORNERS = TABLES["standard"].vertices
 GOOD = {"paddle_0": np.zeros(2, np.float32)}
@@ -59,9 +60,9 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
             lambda: Table(CORNERS, paddle_radius=-0.1),
             "paddle_radius",
         ),
-        (lambda: Cast(TABLES["standard"], ()), "seats"),
+        (lambda: Scene(TABLES["standard"], ()), "seats"),
         (
-            lambda: Cast(
+            lambda: Scene(
                 TABLES["standard"],
                 (make_seat("robot", TABLES["standard"], 0),),
                 blocks=1,
@@ -137,10 +138,10 @@ def test_stepping_before_a_reset_and_after_the_end():
 def test_a_cast_that_a_backend_cannot_play_is_refused_with_the_reason(backend):
     class BlocksAndMouths(Pair):
         @cached_property
-        def cast(self):
-            return replace(super().cast, blocks=2)
+        def scene(self):
+            return replace(super().scene, blocks=2)
 
-    with pytest.raises(ValueError, match="slide into a goal mouth"):
+    with pytest.raises(ValueError, match="slide into a goal line"):
         ah.parallel_env(BlocksAndMouths(), backend=backend)
 
 

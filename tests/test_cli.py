@@ -93,7 +93,7 @@ def test_bench_measures_and_draws(tmp_path):
     assert [(r["scenario"], r["backend"], r["worlds"]) for r in rates] == [
         (s, b, n)
         for s in ("juggle", "duel")
-        for b in ("batched", "pymunk")
+        for b in ("numba", "pymunk")
         for n in (0, 3)
     ]
     for rate in rates:

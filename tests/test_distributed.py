@@ -14,10 +14,10 @@ import pytest
 from test_tutorials import run
 
 import marl_airhockey as ah
+from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.export import export
 from marl_airhockey.learn.train import train
-from marl_airhockey.match import evaluate
 from marl_airhockey.registry import make_driver
 
 ray = pytest.importorskip("ray", reason="Ray has an environment of its own")

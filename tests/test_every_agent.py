@@ -5,7 +5,7 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.match import evaluate
+from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import make_driver
 
 
@@ -13,11 +13,11 @@ def play(scenario, agent, worlds, steps, seed, **keywords):
     drivers = {"paddle_0": agent}
     world = ah.make_world(scenario, worlds, drivers=drivers, **keywords)
     world.reset(seed)
-    sent = []
+    command = []
     for _ in range(steps):
         world.step(np.zeros((worlds, len(world.open), 2)))
-        sent.append(world.sent)
-    return np.array(sent)
+        command.append(world.command)
+    return np.array(command)
 
 
 def test_it_plays_every_scenario_finitely_and_repeatably(agent, scenario):
@@ -51,13 +51,13 @@ def test_it_plays_both_ends_alike(agent):
     far._place(everywhere, flipped, far.memory)
     far._sensed = far._look(everywhere)
     for world, seat in ((near, 0), (far, 1)):
-        world.driven[seat]._draws.renew(everywhere, near.seeds, near.seeds, "same")
+        world.driven[seat]._rng.renew(everywhere, near.seeds, near.seeds, "same")
     for _ in range(40):
         near.step(np.zeros((3, 0, 2)))
         far.step(np.zeros((3, 0, 2)))
         if near.memory["goals"].any():
             break  # The serve after a goal is drawn by each for itself.
-        np.testing.assert_allclose(near.sent[:, 0], -far.sent[:, 1], atol=1e-9)
+        np.testing.assert_allclose(near.command[:, 0], -far.command[:, 1], atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -85,13 +85,13 @@ def test_a_driver_keeps_its_own_pace():
     driver.control_dt = 0.15
     world = ah.make_world("reach", 2, drivers={"paddle_0": driver})
     world.reset(0)
-    asked = []
+    action = []
     for _ in range(9):
         world.step(np.zeros((2, 0, 2)))
-        asked.append(world.asked[:, 0].copy())
+        action.append(world.action[:, 0].copy())
     for k in range(0, 9, 3):
-        np.testing.assert_array_equal(asked[k], asked[k + 2])
-    assert not np.array_equal(asked[0], asked[3])
+        np.testing.assert_array_equal(action[k], action[k + 2])
+    assert not np.array_equal(action[0], action[3])
     driver.control_dt = 0.07
     with pytest.raises(ValueError, match="multiple"):
         ah.make_world("reach", 2, drivers={"paddle_0": driver})
@@ -105,7 +105,7 @@ def test_a_told_paddle_follows_its_driver():
     world = ah.make_world(Pair(), 1, drivers={"paddle_1": Hand()})
     world.reset(0)
     world.step(np.zeros((1, 1, 2)))
-    np.testing.assert_allclose(world.sent[0, 1], [-0.2, 0.0], atol=1e-12)
+    np.testing.assert_allclose(world.command[0, 1], [-0.2, 0.0], atol=1e-12)
     # Told in the ego frame of the far seat: half a turn from the table's.
     np.testing.assert_allclose(world.state.paddle[0, 1], [0.5, -0.1], atol=1e-12)
     np.testing.assert_allclose(
@@ -116,7 +116,7 @@ def test_a_told_paddle_follows_its_driver():
 def score(first, second, games=60):
     """Wins and half the draws of the first, as a share."""
     drivers = {"paddle_0": first, "paddle_1": second}
-    world = ah.make_world("duel", games, backend="batched", drivers=drivers)
+    world = ah.make_world("duel", games, backend="numba", drivers=drivers)
     world.autoreset, goals = False, np.zeros((games, 2))
     world.reset(7)
     playing = np.ones(games, bool)

@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.backend import Command
-from marl_airhockey.cast import Cast, Mouth, Obstacle
-from marl_airhockey.physics import PUCK_SPEED_CAP
+from marl_airhockey.contracts.backend import Command
+from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import GRAVITY, Table
 from marl_airhockey.registry import find_backend
-from marl_airhockey.starts import first_state, roll
-from marl_airhockey.table import GRAVITY, Table, make_seat
+from marl_airhockey.toolkit.starts import first_state, roll
 
 IDLE = Command(np.zeros((1, 1, 2)))
 
@@ -124,8 +125,8 @@ def test_blocks_of_both_shapes_are_moved_and_stop(backend, shape):
 
 
 def test_a_puck_in_a_goal_mouth_is_out_until_it_is_served(backend):
-    mouths = (Mouth("far", 2, 0.30), Mouth("home", 0))
-    bench = Bench(backend, mouths=mouths)
+    goal_lines = (GoalLine("far", 2, 0.30), GoalLine("home", 0))
+    bench = Bench(backend, goal_lines=goal_lines)
     bench.start((-0.7, 0.0), (0.6, 0.05, 2.0, 0.0))
     states = bench.run(0.6)
     crossed = [s.crossed[0, 0] for s in states]
@@ -146,7 +147,7 @@ def test_a_puck_in_a_goal_mouth_is_out_until_it_is_served(backend):
 
 
 def test_a_shot_beside_the_mouth_bounces(backend):
-    bench = Bench(backend, mouths=(Mouth("far", 2, 0.30),))
+    bench = Bench(backend, goal_lines=(GoalLine("far", 2, 0.30),))
     bench.start((-0.7, 0.0), (0.6, 0.22, 1.5, 0.0))
     states = bench.run(0.6)
     assert not any(s.crossed.any() for s in states)
@@ -165,13 +166,15 @@ def test_obstacles_are_solid(backend):
 def test_a_told_paddle_goes_where_it_is_told_and_too_fast_is_lifted(backend):
     bench = Bench(backend)
     bench.start((-0.6, 0.0), (-0.5, 0.0, 0.0, 0.0))
-    told = np.array([[[-0.55, 0.02, 0.3, 0.1]]])
-    state = bench.backend.step(Command(np.zeros((1, 1, 2)), told))
-    np.testing.assert_allclose(state.paddle[0, 0], told[0, 0, :2], atol=1e-12)
-    np.testing.assert_allclose(state.paddle_velocity[0, 0], told[0, 0, 2:], atol=1e-12)
+    prescribed = np.array([[[-0.55, 0.02, 0.3, 0.1]]])
+    state = bench.backend.step(Command(np.zeros((1, 1, 2)), prescribed))
+    np.testing.assert_allclose(state.paddle[0, 0], prescribed[0, 0, :2], atol=1e-12)
+    np.testing.assert_allclose(
+        state.paddle_velocity[0, 0], prescribed[0, 0, 2:], atol=1e-12
+    )
     bench.start((-0.6, 0.0), (-0.4, 0.0, 0.0, 0.0))
-    told = np.array([[[-0.1, 0.0, 0.0, 0.0]]])
-    state = bench.backend.step(Command(np.zeros((1, 1, 2)), told))
+    prescribed = np.array([[[-0.1, 0.0, 0.0, 0.0]]])
+    state = bench.backend.step(Command(np.zeros((1, 1, 2)), prescribed))
     np.testing.assert_allclose(state.paddle[0, 0], [-0.1, 0.0], atol=1e-12)
     assert not state.touched.any()
     np.testing.assert_allclose(state.puck[0, 0], [-0.4, 0.0], atol=1e-12)
@@ -221,7 +224,7 @@ def test_energy_never_rises_without_a_paddle(seed, pucks, tilt, restitution):
     delay=st.sampled_from([0.0, 0.05, 0.08]),
 )
 def test_whatever_the_actions_nothing_impossible_happens(seed, seats, chase, delay):
-    """Reach, acceleration, table, speeds and separate paddles, two seats, a mouth."""
+    """Reach, acceleration, table, speeds and separate paddles, two seats, a goal line."""
     for backend in ideal_backends():
         world = ah.make_world(
             Pair(seats=seats), 4, backend=backend, physics={"action_delay": delay}
@@ -263,9 +266,9 @@ def test_whatever_the_actions_nothing_impossible_happens(seed, seats, chase, del
 def test_two_paddles_meet_and_share_their_normal_speed(backend):
     seat = make_seat("arcade", TABLE, 0)
     kind = find_backend(backend)
-    cast = Cast(TABLE, (seat, seat))
-    table = kind(cast, 1, DT, kind.default_substeps)
-    state = first_state(cast, 1)
+    scene = Scene(TABLE, (seat, seat))
+    table = kind(scene, 1, DT, kind.default_substeps)
+    state = first_state(scene, 1)
     state.position[0] = [(-0.5, 0.0), (-0.3, 0.0)]
     table.start(state, np.arange(1))
     pushing = Command(np.array([[[1.0, 0.3], [-0.4, 0.0]]]))
@@ -296,9 +299,9 @@ def test_pucks_stay_on_a_regular_polygon(backend, sides):
         make_seat("arcade", table, k, tuple(range(sides))) for k in range(sides)
     )
     kind = find_backend(backend)
-    cast = Cast(table, seats, pucks=2)
-    world = kind(cast, 1, DT, kind.default_substeps)
-    state = first_state(cast, 1)
+    scene = Scene(table, seats, pucks=2)
+    world = kind(scene, 1, DT, kind.default_substeps)
+    state = first_state(scene, 1)
     for k, seat in enumerate(seats):
         middle = np.mean(seat.reach, axis=0)
         state.position[0, k] = middle @ table.rotation(seat.side)

@@ -21,7 +21,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
-from marl_airhockey.match import evaluate
+from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import gymnasium_id
 
 FLOORS = {"still": 0.01, "random": 0.10, "sticky": 0.10}
@@ -29,7 +29,7 @@ FLOORS = {"still": 0.01, "random": 0.10, "sticky": 0.10}
 
 def alone(scenario):
     """Keywords that leave one seat open."""
-    others = range(1, len(ah.make_scenario(scenario).cast.seats))
+    others = range(1, len(ah.make_scenario(scenario).scene.seats))
     return {"drivers": {f"paddle_{i}": "sticky" for i in others}}
 
 
@@ -178,12 +178,12 @@ def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
     world.autoreset = False
     world.reset(4)
     game, start = world.scenario, world.memory
-    states, sent, rewards = [world.state], [], []
+    states, command, rewards = [world.state], [], []
     rng = np.random.default_rng(1)
     for _ in range(steps):
         step = world.step(rng.uniform(-1, 1, (worlds, len(world.open), 2)))
         states.append(world.state)
-        sent.append(world.sent)
+        command.append(world.command)
         rewards.append(step.reward)
 
     def stack(name):
@@ -194,16 +194,16 @@ def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
     names += ("touching", "crossed", "crossed_velocity", "visible", "time")
     path = np.stack([paths[0], *paths]) if paths else None
     recording = type(states[1])(
-        game.cast.bodies, *(stack(name) for name in names), path=path
+        game.scene.bodies, *(stack(name) for name in names), path=path
     )
-    sent = np.stack(sent)
-    memory = game.scan(start, recording, sent)
+    command = np.stack(command)
+    memory = game.replay_memory(start, recording, command)
     before, after = (
         recording.map(lambda x, s=s: x[s]) for s in (slice(None, -1), slice(1, None))
     )
     old = {k: v[:-1] for k, v in memory.items()}
     new = {k: v[1:] for k, v in memory.items()}
-    terms = game.judge(before, sent, after, old, new)
+    terms = game.all_reward_terms(before, command, after, old, new)
     np.testing.assert_allclose(sum(terms.values()), rewards, atol=1e-12)
     for name, value in world.memory.items():
         # The loop's exp and numpy's differ in the last digit.
@@ -240,6 +240,6 @@ def test_options_reach_the_scenario(scenario, backend):
     for seats in ("robot", "arcade"):
         env = ah.parallel_env(scenario, backend=backend, seats=seats)
         env.reset(seed=0)
-        assert env.world.cast.seats[0].speed == {"robot": 0.7, "arcade": 2.5}[seats]
+        assert env.world.scene.seats[0].speed == {"robot": 0.7, "arcade": 2.5}[seats]
     short = ah.parallel_env(scenario, backend=backend, options={"seconds": 0.5})
     assert short.max_cycles == 10

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from marl_airhockey.fit import FITTED, fit, play, recorded
-from marl_airhockey.physics import load_physics
-from marl_airhockey.play.court import RATE, Court
+from marl_airhockey.core.physics import load_physics
+from marl_airhockey.play.live_match import RATE, Court
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import make_driver
+from marl_airhockey.transfer.system_id import FITTED, fit, play, recorded
 
 pytest.importorskip("scipy")
 OTHER = {

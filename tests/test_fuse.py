@@ -7,7 +7,7 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.fuse import Fused
+from marl_airhockey.jit.fused import Fused
 
 
 def many_operations(source, other):

@@ -179,9 +179,9 @@ def test_a_turned_game_gives_turned_rewards(name, backend):
         world._sensed = world._look()
     paid = np.zeros(count, bool)
     for _ in range(30):
-        asked = rng.uniform(-1, 1, (count, seats, 2))
-        one = worlds[0].step(asked)
-        two = worlds[1].step(np.roll(asked, shift, axis=1))
+        action = rng.uniform(-1, 1, (count, seats, 2))
+        one = worlds[0].step(action)
+        two = worlds[1].step(np.roll(action, shift, axis=1))
         live = ~paid & ~one.terminated
         # A goal is served again with luck of its own, so that is where it ends.
         paid |= (one.reward != 0).any(-1)
@@ -226,7 +226,7 @@ def test_two_pucks_are_served_apart_and_both_count(backend):
 
 def shoot(world, side, speed=2.5):
     """Send the puck through the middle of a side of a polygon, past its paddle."""
-    normal, offset = world.cast.table.normals[side], world.cast.table.offsets[side]
+    normal, offset = world.scene.table.normals[side], world.scene.table.offsets[side]
     place_puck(world, *(-normal * (offset - 0.04)), *(-normal * speed))
 
 
@@ -245,7 +245,7 @@ def test_lives_are_lost_goals_shut_and_the_last_one_wins(backend, sides):
             total += sum(s.reward for s in steps)[0]
             heir = side if life == 0 else (side + 1) % sides
             if heir < sides - 1:
-                out = -world.cast.table.normals[heir]
+                out = -world.scene.table.normals[heir]
                 assert (world.state.puck_velocity[:, 0] @ out > 0.45).all()
     assert total.tolist() == [-2.0] * (sides - 1) + [0.0]
     assert steps[0].terminated.all() or steps[1].terminated.all()
@@ -259,15 +259,15 @@ def test_a_goal_without_an_owner_is_a_wall_and_its_paddle_is_away(backend):
     shoot(world, 1)
     idle(world, 0.15)
     assert (world.memory["lives"] == [1, 0, 1, 1]).all()
-    normal, offset = world.cast.table.normals[1], world.cast.table.offsets[1]
+    normal, offset = world.scene.table.normals[1], world.scene.table.offsets[1]
     assert (world.state.paddle[:, 1] @ normal < -offset).all()
     shoot(world, 1, 1.0)
     idle(world, 0.2)
     assert (world.memory["lives"] == [1, 0, 1, 1]).all()
     assert (world.state.puck_velocity[:, 0] @ normal > 0.5).all()
     # Whoever is out cannot act, and comes back with the next episode.
-    asked = np.ones((2, 4, 2))
-    world.step(asked)
+    action = np.ones((2, 4, 2))
+    world.step(action)
     assert (world.state.paddle[:, 1] @ normal < -offset).all()
     world.reset(1)
     assert (world.state.paddle[:, 1] @ normal > -offset).all()
@@ -281,11 +281,11 @@ def test_a_goal_pays_who_touched_the_puck_last(backend):
     rows.paddle[:, 0], rows.paddle[:, 2] = (-0.2, 0.0), (0.3, 0.3)
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (-0.1, 0.0), (0.0, 0.0)
     world._place(np.arange(2), rows, world.memory)
-    asked = np.zeros((2, 4, 2))
+    action = np.zeros((2, 4, 2))
     total = np.zeros((2, 4))
     for step in range(20):
-        asked[:, 0, 0] = 1.0 if step < 3 else 0.0
-        total += world.step(asked).reward
+        action[:, 0, 0] = 1.0 if step < 3 else 0.0
+        total += world.step(action).reward
     assert total.tolist() == [[1.0, 0.0, -1.0, 0.0]] * 2
 
 
@@ -316,6 +316,6 @@ def test_mates_are_paid_for_striking_in_turn(backend):
         terms = [s.terms["pass"] for s in idle(world, 0.1)]
         assert sum(terms).tolist() == [[paid, paid]] * 2
     assert (world.memory["passes"] == 2).all()
-    reaches = [np.asarray(seat.reach)[:, 1] for seat in world.cast.seats]
+    reaches = [np.asarray(seat.reach)[:, 1] for seat in world.scene.seats]
     assert reaches[0].min() > 0.049
     assert reaches[1].max() < -0.049

@@ -39,18 +39,18 @@ def test_reward_success_and_compute_reward_agree(goal_scenario):
     world.reset(0)
     game = world.scenario
     achieved, rewards = [], []
-    met = np.zeros(worlds, bool)
+    goal_met = np.zeros(worlds, bool)
     for _ in range(world.max_cycles):
         step = world.step(np.zeros((worlds, 0, 2)))
         achieved.append(game.achieved(world.state, world.memory))
         wanted = game.desired(world.memory)
         rewards.append(game.goal_reward(achieved[-1], wanted))
-        met |= rewards[-1] > 0
-        np.testing.assert_array_equal(world.episode.success[:, 0], met)
+        goal_met |= rewards[-1] > 0
+        np.testing.assert_array_equal(world.episode.success[:, 0], goal_met)
         # Only a met goal ends it: a dropped puck does not.
         np.testing.assert_array_equal(step.terminated, rewards[-1] > 0)
     np.testing.assert_allclose(world.episode.returns[:, 0], np.sum(rewards, axis=0))
-    assert met.any()
+    assert goal_met.any()
     # Relabelled: what was achieved at any moment is a goal that it met there.
     late = np.array(achieved)
     counts = np.ones(late.shape[:2], bool)

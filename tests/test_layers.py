@@ -10,7 +10,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
 LAYERS = (
     {"state", "draws", "table"},
-    {"physics", "cast", "rewards", "views", "starts", "shots", "limits"}
+    {"physics", "scene", "rewards", "views", "starts", "shots", "limits"}
     | {"paddles", "rails", "scenario", "driver", "backend", "extras", "layout"}
     | {
         "symbols",

@@ -7,27 +7,32 @@ import pytest
 from test_learn import SMALL, rows
 
 import marl_airhockey as ah
-from marl_airhockey.contest import play
-from marl_airhockey.frozen import Frozen
-from marl_airhockey.league import found_in, league
-from marl_airhockey.learn.arena import environment
+from marl_airhockey.evaluation.games import play
+from marl_airhockey.evaluation.league import found_in, league
+from marl_airhockey.evaluation.stats import (
+    bootstrap,
+    elo,
+    iqm,
+    probability_of_improvement,
+)
+from marl_airhockey.learn.best_response import best_response
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.exploit import best_response
-from marl_airhockey.learn.policy import load_policy
-from marl_airhockey.learn.ppo import build
+from marl_airhockey.learn.sb3 import build
+from marl_airhockey.learn.self_play import environment
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
-from marl_airhockey.roster import Roster
-from marl_airhockey.stats import bootstrap, elo, iqm, probability_of_improvement
+from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.world.roster import Roster
 
-SHORT = {"options": {"seconds": 6.0}, "backend": "batched"}
+SHORT = {"options": {"seconds": 6.0}, "backend": "numba"}
 
 
 def test_a_roster_plays_as_drivers_inside_do():
     names = ["striker", "goalkeeper"]
     inside = dict(zip(("paddle_0", "paddle_1"), names, strict=True))
-    one = ah.make_world("duel", 6, backend="batched", drivers=inside)
-    two = ah.make_world("duel", 6, backend="batched")
+    one = ah.make_world("duel", 6, backend="numba", drivers=inside)
+    two = ah.make_world("duel", 6, backend="numba")
     roster = Roster(two)
     for name in names:
         roster.add(name, make_driver(name))
@@ -45,7 +50,7 @@ def test_a_roster_plays_as_drivers_inside_do():
 
 
 def test_who_sits_where_differs_by_world():
-    world = ah.make_world("duel", 4, backend="batched")
+    world = ah.make_world("duel", 4, backend="numba")
     roster = Roster(world)
     still, random = (roster.add(n, make_driver(n)) for n in ("still", "random"))
     roster.seated[:] = [[still, random], [random, still], [-1, random], [-1, -1]]
@@ -55,15 +60,15 @@ def test_who_sits_where_differs_by_world():
     roster.ask(actions)
     assert not actions[[0, 1], [0, 1]].any()
     assert (actions[[2, 3, 3], [0, 0, 1]] == 9.0).all()
-    asked = actions[[0, 1, 2], [1, 0, 1]]
-    assert (np.abs(asked) <= 1).all()
-    assert len(np.unique(asked)) == 6
+    action = actions[[0, 1, 2], [1, 0, 1]]
+    assert (np.abs(action) <= 1).all()
+    assert len(np.unique(action)) == 6
 
 
 def test_games_have_a_winner_or_none_and_ends_do_not_matter():
     players = [make_driver("allround"), make_driver("random")]
     lineups = np.array([[0, 1]] * 20 + [[1, 0]] * 20)
-    found = play("duel", players, lineups, 0, {"backend": "batched"})
+    found = play("duel", players, lineups, 0, {"backend": "numba"})
     np.testing.assert_allclose(found.score.sum(-1), 1.0)
     np.testing.assert_allclose(found.margin.sum(-1), 0.0)
     mine = found.score[lineups == 0]
@@ -71,7 +76,7 @@ def test_games_have_a_winner_or_none_and_ends_do_not_matter():
     assert mine[20:].mean() > 0.9
     assert (found.seconds <= 60.0 + 1e-6).all()
     everybody = np.array([[0, 1, 1, 1]] * 12)
-    crowd = play("free_for_all", players, everybody, 0, {"backend": "batched"})
+    crowd = play("free_for_all", players, everybody, 0, {"backend": "numba"})
     assert crowd.won[:, 0].mean() > 0.5
     with pytest.raises(ValueError, match="no teams"):
         play("rally", players, lineups, 0)
@@ -181,7 +186,7 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     past = sorted((folder / "milestones").glob("*.npz"))
     assert len(past) >= 2
     policy, old = load_policy(folder / "last.zip"), load_policy(past[-1])
-    world = ah.make_world("duel", 8, backend="batched")
+    world = ah.make_world("duel", 8, backend="numba")
     seen = world.reset(0)[:, 0]
     same = policy.predict(seen, True), old.predict(seen, True)
     np.testing.assert_allclose(*(np.clip(x, -1, 1) for x in same), atol=1e-5)
@@ -193,9 +198,9 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
 
 def test_a_frozen_policy_is_one_small_file(tmp_path):
     config = preset("reach", SMALL)
-    env = ah.make_sb3_vec("reach", 32, backend="batched")
-    from marl_airhockey.learn.keeper import Rate
+    env = ah.make_sb3_vec("reach", 32, backend="numba")
     from marl_airhockey.learn.network import freeze
+    from marl_airhockey.learn.sb3_callback import Rate
 
     model = build(config, env, Rate(config, 1e-3))
     freeze(model, {"scenario": "reach"}).save(tmp_path / "policy.npz")

@@ -15,11 +15,12 @@ import torch
 from stable_baselines3 import PPO, SAC
 
 import marl_airhockey as ah
+from marl_airhockey.evaluation.deployability import Deployability
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
-from marl_airhockey.learn.policy import load_policy
 from marl_airhockey.learn.train import train
-from marl_airhockey.match import Deployability, evaluate
-from marl_airhockey.stats import interval
+from marl_airhockey.toolkit.policies import load_policy
 
 SMALL = {
     "total_steps": 16_384,
@@ -187,7 +188,7 @@ def test_a_policy_can_sit_in_any_seat_by_its_path(run):
     world = ah.make_world("touch", 2, drivers={"paddle_0": str(run)})
     world.reset(0)
     world.step(np.zeros((2, 0, 2)))
-    assert np.abs(world.sent).max() > 0
+    assert np.abs(world.command).max() > 0
 
 
 def test_the_measures_of_a_match():

@@ -4,7 +4,7 @@ import numpy as np
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.render import SEAT_COLOURS, Scene, draw
+from marl_airhockey.render.renderer import SEAT_COLOURS, Frame, draw
 
 
 def test_a_picture_shows_the_paddle_where_it_is(scenario):
@@ -13,8 +13,8 @@ def test_a_picture_shows_the_paddle_where_it_is(scenario):
     picture = env.render()
     assert picture.dtype == np.uint8
     assert picture.shape[1] == 880
-    low, high = env.world.cast.table.vertices[1], env.world.cast.table.vertices[3]
-    x, y = env.world.state.paddle[0, 0] + 0.53 * env.world.cast.table.paddle_radius
+    low, high = env.world.scene.table.vertices[1], env.world.scene.table.vertices[3]
+    x, y = env.world.state.paddle[0, 0] + 0.53 * env.world.scene.table.paddle_radius
     wide = high[0] - low[0] + 0.15
     column = round((x - low[0] + 0.075) / wide * 880)
     row = picture.shape[0] - round((y - low[1] + 0.075) / wide * 880)
@@ -45,6 +45,6 @@ def test_a_square_block_is_drawn_turned():
     env = ah.parallel_env("move_block", options={"shape": "square"})
     env.reset(seed=0)
     state = env.world.state.map(lambda x: x[0].copy())
-    straight = draw(Scene(env.world.cast, state))
+    straight = draw(Frame(env.world.scene, state))
     state.angle[2] = 0.6
-    assert not np.array_equal(straight, draw(Scene(env.world.cast, state)))
+    assert not np.array_equal(straight, draw(Frame(env.world.scene, state)))

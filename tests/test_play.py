@@ -17,13 +17,16 @@ import websockets
 from pages import aim, line, page_at, running, state_of, wait
 from PIL import Image
 
-from marl_airhockey.play.court import RATE, STRENGTHS, Court, Fairness
-from marl_airhockey.play.film import film
+from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.play.handicap import STRENGTHS, Fairness
+from marl_airhockey.play.live_match import RATE, Court
+from marl_airhockey.play.measures import _comes, _reactions
 from marl_airhockey.play.protocol import BURST, LARGEST, Meter, parse
-from marl_airhockey.play.recorder import Recorder, read
-from marl_airhockey.play.report import _comes, _reactions, report
+from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.report import report
 from marl_airhockey.play.server import listen as listen_at
 from marl_airhockey.play.session import IDLE, Session
+from marl_airhockey.play.video import film
 from marl_airhockey.registry import scenario_names
 
 BAD = [
@@ -296,7 +299,7 @@ def test_fair_opponents_act_late_and_slowly():
 
 
 def test_an_episode_is_recorded_step_by_step(tmp_path):
-    options = {"options": {"seconds": 2.0}, "backend": "batched"}
+    options = {"options": {"seconds": 2.0}, "backend": "numba"}
     court = Court("duel", {"paddle_1": "striker"}, options, seed=5)
     session = Session(court, Recorder(tmp_path))
     guest = session.join()

@@ -8,8 +8,8 @@ from collections import Counter
 import pytest
 from pages import aim, line, page_at, running, wait
 
-from marl_airhockey.play.court import RATE
-from marl_airhockey.play.recorder import head
+from marl_airhockey.evaluation.recordings import head
+from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.report import report
 from marl_airhockey.play.session import GONE, GRACE, IDLE
 from marl_airhockey.study.answers import read_answers

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from marl_airhockey.cli import app
+from marl_airhockey.cli.main import app
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
-from marl_airhockey.transfer import measure, picture, tuned
+from marl_airhockey.transfer.measure import measure, picture, tuned
 
 SMALL = {
     "total_steps": 2048,
@@ -22,7 +22,7 @@ SMALL = {
 
 def test_success_is_measured_in_all_physics(tmp_path):
     pytest.importorskip("robosuite")
-    backends = ["batched", "pymunk", "robosuite"]
+    backends = ["numba", "pymunk", "robosuite"]
     policies = {"zoo": make_driver("zoo/reach"), "nothing": make_driver("still")}
     rows = measure(policies, "reach", backends, ["ideal"], episodes=20)
     assert [row.backend for row in rows] == backends * 2
@@ -58,10 +58,10 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
 def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
     """And looks at all that is asked before it trains anything."""
     out = str(tmp_path)
-    ask = ["transfer", "reach", "--out", out, "--episodes", "5", "--to", "batched"]
+    ask = ["transfer", "reach", "--out", out, "--episodes", "5", "--to", "numba"]
     for wrong, words in (
         (["--profile", "real"], "unknown profile 'real'"),
-        (["--to", "batched,mujoco"], "unknown backend 'mujoco'"),
+        (["--to", "numba,mujoco"], "unknown backend 'mujoco'"),
         (["--policy", "still", "--fine-tune", "64"], "none is the folder of a run"),
     ):
         with pytest.raises(ValueError, match=words):
@@ -75,7 +75,7 @@ def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
         (folder / "config.toml").touch()
         raise RuntimeError("cut off")
 
-    monkeypatch.setattr("marl_airhockey.cli_transfer.train_shown", train)
+    monkeypatch.setattr("marl_airhockey.cli.transfer.train_shown", train)
     for _ in range(2):
         with pytest.raises(RuntimeError, match="cut off"):
             app(ask, standalone_mode=False)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import marl_airhockey as ah
-from marl_airhockey.chain import Chain, Fixed, Stage
-from marl_airhockey.loops import load
+from marl_airhockey.jit.codegen import load
+from marl_airhockey.jit.pipeline import Fixed, Pipeline, Stage
 
 GAMES = [
     ("juggle", {}),
@@ -27,10 +27,16 @@ def play(world, steps):
             rng.uniform(-1.3, 1.3, (len(world.seeds), len(world.open), 2))
         )
         seen += [step.observation, step.reward, step.terms, step.terminated]
-        seen += [step.truncated, step.sent, step.excess, step.success, step.first_shot]
+        seen += [
+            step.truncated,
+            step.command,
+            step.violation,
+            step.success,
+            step.first_shot,
+        ]
         seen += [world.state.position.copy(), world.state.touched_at.copy()]
         seen += [{k: v.copy() for k, v in world.memory.items()}]
-        seen += [world.episode.returns.copy(), world.sent.copy()]
+        seen += [world.episode.returns.copy(), world.command.copy()]
     return seen
 
 
@@ -39,7 +45,7 @@ def play(world, steps):
 def test_a_turn_gives_what_its_parts_give(game, keywords, backend, worlds, monkeypatch):
     runs = []
     for patience in (20, 10**9):
-        monkeypatch.setattr("marl_airhockey.world.PATIENCE", patience)
+        monkeypatch.setattr("marl_airhockey.world.world.PATIENCE", patience)
         world = ah.make_world(game, worlds, backend=backend, max_cycles=90, **keywords)
         runs.append(play(world, 250))
         assert (world._turn is not None) == (patience == 20)
@@ -48,25 +54,35 @@ def test_a_turn_gives_what_its_parts_give(game, keywords, backend, worlds, monke
 
 
 def test_what_a_step_gives_is_the_users_own():
-    world = ah.make_world("juggle", 3, backend="batched")
+    world = ah.make_world("juggle", 3, backend="numba")
     world.reset(0)
     steps, kept, worlds, copies = [], [], [], []
     for k in range(80):
         step = world.step(np.full((3, 1, 2), np.sin(k)))
         now = [world.state.position, world.memory["hits"], world.episode.cycles]
-        worlds.append([*now, world.sent, world.sensed.velocity])
+        worlds.append([*now, world.command, world.sensed.velocity])
         copies.append([array.copy() for array in worlds[-1]])
         steps.append(step)
         kept.append([step.observation.copy(), step.reward.copy(), step.success.copy()])
-        kept[-1] += [step.sent.copy(), step.excess.copy(), step.terms["hit"].copy()]
+        kept[-1] += [
+            step.command.copy(),
+            step.violation.copy(),
+            step.terms["hit"].copy(),
+        ]
     for step, old in zip(steps, kept, strict=True):
-        now = [step.observation, step.reward, step.success, step.sent, step.excess]
+        now = [
+            step.observation,
+            step.reward,
+            step.success,
+            step.command,
+            step.violation,
+        ]
         np.testing.assert_equal([*now, step.terms["hit"]], old)
     np.testing.assert_equal(worlds, copies)
 
 
 def test_an_action_that_is_not_finite_moves_nothing():
-    world = ah.make_world("juggle", 3, backend="batched")
+    world = ah.make_world("juggle", 3, backend="numba")
     world.reset(0)
     actions = np.zeros((3, 1, 2))
     for _ in range(60):
@@ -91,7 +107,7 @@ def test_a_chain_calls_its_stages_until_one_stops_it():
     add = load(source).kernel
     x, limit = np.zeros((4, 2)), np.full(1, 2.5)
     first = Stage(add, (x, Fixed(limit), 1.0), stops=True)
-    chain = Chain(4, [first, Stage(add, (x, Fixed(limit), 0.25))])
+    chain = Pipeline(4, [first, Stage(add, (x, Fixed(limit), 0.25))])
     assert chain(0)
     np.testing.assert_array_equal(x, 1.25)
     assert chain(0)

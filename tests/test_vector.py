@@ -119,7 +119,7 @@ def test_the_robot_profile_delays_and_blurs():
     errors = np.array(errors)
     # 33 ms old: a falling puck is seen above where it is.
     assert 0.01 < np.median(errors) < 0.06
-    assert (sharp.sent[:, 0] != blurred.sent[:, 0]).any()
+    assert (sharp.command[:, 0] != blurred.command[:, 0]).any()
     # One step of action delay: nothing moves in the first 50 ms.
     for world in (sharp, blurred):
         world.reset(0)
@@ -157,7 +157,7 @@ def test_pixels_show_the_table_and_change():
 def test_threads_do_not_change_a_number():
     program = (
         "import hashlib, numpy as np, marl_airhockey as ah\n"
-        "w = ah.make_world('juggle', 4096, backend='batched')\n"
+        "w = ah.make_world('juggle', 4096, backend='numba')\n"
         "seen, rng = [w.reset(0)], np.random.default_rng(0)\n"
         "for _ in range(30):\n"
         "    step = w.step(rng.uniform(-1, 1, (4096, 1, 2)))\n"

@@ -6,10 +6,10 @@ import sys
 import pytest
 
 import marl_airhockey as ah
-from marl_airhockey.contest import challenge
-from marl_airhockey.frozen import Frozen
-from marl_airhockey.match import evaluate
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.evaluation.games import challenge
 from marl_airhockey.registry import ZOO, make_driver, zoo_names
+from marl_airhockey.toolkit.numpy_policy import Frozen
 
 
 @pytest.mark.parametrize("name", zoo_names())
@@ -21,7 +21,7 @@ def test_it_is_small_and_as_good_as_its_card(name):
     assert card["command"].startswith(f"airhockey train {card['scenario']} --seed")
     assert card["date"] >= "2026-11-21"
     grades = card["grades"]
-    options = {"backend": "batched", "profile": card["profile"]}
+    options = {"backend": "numba", "profile": card["profile"]}
     options["options"] = card["options"]
     if "success" in grades:
         driver = ah.make_agent(name)

@@ -10,9 +10,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.make import Keywords
-from marl_airhockey.physics import unknown
+from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.registry import make_scenario, scenario_names
+from marl_airhockey.world.build import Keywords
 
 # Not the goalkeeper as it stands: hardly anything gets past it, so that most games
 # against it are drawn and teach nothing.
@@ -44,7 +44,7 @@ class TrainConfig:
 
     scenario: str
     seed: int = 0
-    backend: str = "batched"
+    backend: str = "numba"
     profile: str = "ideal"
     observe: str = "velocity"
     options: dict[str, Any] = field(default_factory=dict)
@@ -152,7 +152,7 @@ class TrainConfig:
 
     @cached_property
     def _open_teams(self) -> list[int]:
-        seats = enumerate(make_scenario(self.scenario, **self.options).cast.seats)
+        seats = enumerate(make_scenario(self.scenario, **self.options).scene.seats)
         return [s.team for i, s in seats if f"paddle_{i}" not in self.drivers]
 
     @property
@@ -203,13 +203,13 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
         ValueError: an unknown scenario or field, or a bad value.
     """
     if scenario not in scenario_names():
-        raise ValueError(unknown("scenario", scenario, scenario_names()))
+        raise ValueError(unknown_name("scenario", scenario, scenario_names()))
     text = resources.files(__package__).joinpath("presets.toml").read_text()
     presets = tomllib.loads(text)
     known = [f.name for f in fields(TrainConfig)]
     for name in changes or {}:
         if name not in known:
-            raise ValueError(unknown("setting", name, known))
+            raise ValueError(unknown_name("setting", name, known))
     merged = {**presets["defaults"], **presets.get(scenario, {})}
     robot = {"observe": "history", **merged.pop("robot", {})}
     merged |= robot if (changes or {}).get("profile") == "robot" else {}

@@ -7,14 +7,14 @@ import json
 import shutil
 from pathlib import Path
 
-from marl_airhockey.film import film
+from marl_airhockey.evaluation.evaluate import Result, evaluate
+from marl_airhockey.evaluation.watch import film
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.ledger import Report
 from marl_airhockey.learn.plots import learning_curve
-from marl_airhockey.learn.policy import load_policy
+from marl_airhockey.learn.run import Report
 from marl_airhockey.learn.train import train, versions
-from marl_airhockey.match import Result, evaluate
 from marl_airhockey.registry import make_agent
+from marl_airhockey.toolkit.policies import load_policy
 
 BESIDE = ("still", "random", "striker")
 

@@ -11,15 +11,15 @@ from typing import Any
 
 from stable_baselines3 import PPO
 
-from marl_airhockey.contest import challenge
-from marl_airhockey.frozen import Frozen
+from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
+from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
-from marl_airhockey.learn.ledger import Progress
 from marl_airhockey.learn.network import freeze
-from marl_airhockey.learn.policy import Policy, frozen_policy
-from marl_airhockey.match import TEST_SEED, evaluate
+from marl_airhockey.learn.run import Progress
 from marl_airhockey.registry import make_driver, make_scenario
-from marl_airhockey.stats import interval
+from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.policies import Policy, frozen_policy
 
 EPISODES = 1000
 GAMES = 200

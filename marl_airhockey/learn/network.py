@@ -11,9 +11,9 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from marl_airhockey.frozen import Frozen
+from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.vector_sb3 import AirHockeyVecEnv
+from marl_airhockey.toolkit.numpy_policy import Frozen
 
 
 class FixedScale(BaseFeaturesExtractor):

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from marl_airhockey.charts import DPI, INK, INKS, PALE, curve, save, tidy
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, PALE, curve, save, tidy
 
 
 def learning_curve(

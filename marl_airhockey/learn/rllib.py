@@ -19,15 +19,15 @@ from ray.rllib.algorithms.ppo import PPO, PPOConfig
 from ray.rllib.core import DEFAULT_MODULE_ID
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 
-from marl_airhockey.frozen import Frozen
-from marl_airhockey.learn.arena import environment
-from marl_airhockey.learn.batch_runner import RUNNER_CPU, ActorCritic, BatchRunner
+from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.judge import Grades, judge
-from marl_airhockey.learn.ledger import Ledger
+from marl_airhockey.learn.grade import Grades, judge
 from marl_airhockey.learn.network import card
-from marl_airhockey.learn.policy import frozen_policy
-from marl_airhockey.vector_sb3 import AirHockeyVecEnv
+from marl_airhockey.learn.rllib_runner import RUNNER_CPU, ActorCritic, BatchRunner
+from marl_airhockey.learn.run import Ledger
+from marl_airhockey.learn.self_play import environment
+from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.policies import frozen_policy
 
 
 def algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:

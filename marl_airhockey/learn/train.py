@@ -14,11 +14,10 @@ from collections.abc import Callable
 from importlib import metadata
 from pathlib import Path
 
-from marl_airhockey.extras import need
+from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.learn.config import TrainConfig, load_config
-from marl_airhockey.learn.judge import Grades
-from marl_airhockey.learn.ledger import Ledger, Report
-from marl_airhockey.physics import unknown
+from marl_airhockey.learn.grade import Grades
+from marl_airhockey.learn.run import Ledger, Report
 
 
 def train(
@@ -43,7 +42,7 @@ def train(
     elif (folder / "config.toml").exists():
         raise ValueError(f"{folder} holds a run already: use --resume, or another")
     if config.engine not in ENGINES:
-        raise ValueError(unknown("engine", config.engine, ENGINES))
+        raise ValueError(unknown_name("engine", config.engine, ENGINES))
     learn = ENGINES[config.engine]()
     if not (folder / "config.toml").exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -57,14 +56,14 @@ Learn = Callable[[Ledger], Grades]
 
 
 def _sb3() -> Learn:
-    need("stable_baselines3", "train")
-    from marl_airhockey.learn.ppo import learn
+    require("stable_baselines3", "train")
+    from marl_airhockey.learn.sb3 import learn
 
     return learn
 
 
 def _rllib() -> Learn:
-    need("ray", "distributed")
+    require("ray", "distributed")
     from marl_airhockey.learn.rllib import learn
 
     return learn

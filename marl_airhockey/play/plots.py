@@ -8,8 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from marl_airhockey.charts import DPI, INK, INKS, save, tidy
-from marl_airhockey.play.report import Player, Report
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.play.measures import Player
+from marl_airhockey.play.report import Report
 
 MOST = 4
 """Players whose distributions are drawn."""

@@ -19,8 +19,8 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from marl_airhockey.evaluation.recordings import read
 from marl_airhockey.play.protocol import LARGEST
-from marl_airhockey.play.recorder import read
 from marl_airhockey.play.session import Guest, Session
 
 WEB = Path(__file__).parent / "web"

@@ -10,7 +10,8 @@ import secrets
 import time
 from typing import Any
 
-from marl_airhockey.play.court import PERSON, RATE, STRENGTHS, Court
+from marl_airhockey.play.handicap import STRENGTHS
+from marl_airhockey.play.live_match import PERSON, RATE, Court
 from marl_airhockey.play.protocol import Meter, parse
 from marl_airhockey.play.recorder import Recorder
 

@@ -12,9 +12,9 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from marl_airhockey.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.evaluation.stats import bootstrap, interval
 from marl_airhockey.play.report import RESAMPLES, shown
-from marl_airhockey.stats import bootstrap, interval
 from marl_airhockey.study.archive import diaries
 from marl_airhockey.study.plan import POINTS
 

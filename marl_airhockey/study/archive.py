@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.play.recorder import head
+from marl_airhockey.evaluation.recordings import head
 from marl_airhockey.study.plan import Plan
 
 FORMAT = 1

@@ -12,7 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from marl_airhockey.play.court import PERSON, Fairness
+from marl_airhockey.play.handicap import Fairness
+from marl_airhockey.play.live_match import PERSON
 
 EXAMPLE = Path(__file__).parent / "example.toml"
 POINTS = 7

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.play.court import PERSON, RATE, Court
+from marl_airhockey.play.live_match import PERSON, RATE, Court
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.session import GONE, GRACE, IDLE, Guest, Session
 from marl_airhockey.study.archive import Diary, diaries, digest, erase
@@ -51,8 +51,8 @@ def open_court(plan: Plan) -> Court:
     )
     seats = len(court.seats)
     if (seats == 1) != (not plan.opponents):
-        need = "no opponents" if seats == 1 else "opponents"
-        raise ValueError(f"opponents: {plan.scenario} needs {need}")
+        needs = "no opponents" if seats == 1 else "opponents"
+        raise ValueError(f"opponents: {plan.scenario} needs {needs}")
     if seats != 2 and PERSON in [opponent.name for opponent in plan.opponents]:
         raise ValueError("opponents: a person can be met in a game of two seats")
     for opponent in (plan.practice_opponent, *plan.opponents):

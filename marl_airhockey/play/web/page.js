@@ -90,7 +90,7 @@ function take(data) {
     trip = trip === null ? spent : trip + 0.1 * (spent - trip);
   }
   for (const [kind, which] of data.events) {
-    if (kind === "goal" && court.mouths[which]) { flash = 1; flashColour = colour(scorer(court.mouths[which].owner)); beep(220, 0.35); }
+    if (kind === "goal" && court.goal_lines[which]) { flash = 1; flashColour = colour(scorer(court.goal_lines[which].owner)); beep(220, 0.35); }
     else beep(520 + 90 * which, 0.05);
   }
   correct(data);
@@ -314,11 +314,11 @@ function drawTable() {
     const t = seat.turn, back = seat.reach.map(([u, v]) => [t[0][0] * u + t[1][0] * v, t[0][1] * u + t[1][1] * v]);
     path(back); pen.strokeStyle = alpha(colour(i), 0.22); pen.stroke();
   });
-  for (const mouth of court.mouths) {
-    if (now.retired.includes(mouth.owner)) continue;
-    const [a, b] = mouth.ends, n = court.normals[mouth.side];
+  for (const goalLine of court.goal_lines) {
+    if (now.retired.includes(goalLine.owner)) continue;
+    const [a, b] = goalLine.ends, n = court.normals[goalLine.side];
     path([a, b, [b[0] - 0.04 * n[0], b[1] - 0.04 * n[1]], [a[0] - 0.04 * n[0], a[1] - 0.04 * n[1]]]);
-    pen.fillStyle = colour(mouth.owner); pen.fill();
+    pen.fillStyle = colour(goalLine.owner); pen.fill();
   }
   for (const [ax, ay, bx, by, r] of court.obstacles) {
     path([[ax, ay], [bx, by]], false); pen.strokeStyle = inks.rail; pen.lineWidth = 2 * r * fit.scale; pen.lineCap = "round"; pen.stroke();

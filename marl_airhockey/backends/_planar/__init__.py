@@ -1,0 +1,1 @@
+"""Laws of the 2D table that its backends share."""

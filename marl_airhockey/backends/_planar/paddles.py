@@ -1,0 +1,99 @@
+"""How paddles move and meet: one law for every 2D backend."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.types import Array
+
+
+@njit(cache=True)
+def drive(
+    position: Array,
+    velocity: Array,
+    goal: Array,
+    prescribed: Array,
+    lifted: Array,
+    left: int,
+    dt: float,
+    diameter: float,
+    mean: Array,
+) -> bool:
+    """Move paddles by a substep of their linear ramps, in place; True if any met.
+
+    Args:
+        position: (paddles, 2) m.
+        velocity: (paddles, 2) m/s.
+        goal: (paddles, 2) m/s after the ``left`` substeps to come.
+        prescribed: (paddles,) bool: moves at its goal all along and does not yield.
+        lifted: (paddles,) bool: touches nothing.
+        left: substeps in what is left of the ramp.
+        dt: of a substep, s.
+        diameter: distance of two centres in contact, m.
+        mean: (paddles, 2) m/s, filled with how fast each goes within the substep.
+    """
+    for i in range(len(position)):
+        for axis in range(2):
+            if prescribed[i]:
+                velocity[i, axis] = goal[i, axis]
+            ramp = (goal[i, axis] - velocity[i, axis]) / left
+            mean[i, axis] = velocity[i, axis] + 0.5 * ramp
+            position[i, axis] += mean[i, axis] * dt
+            velocity[i, axis] += ramp
+    met = meet(position, velocity, prescribed, lifted, diameter)
+    if met:
+        mean[:] = velocity
+    return met
+
+
+@njit(cache=True)
+def meet(
+    position: Array, velocity: Array, prescribed: Array, lifted: Array, diameter: float
+) -> bool:
+    """Separate overlapping paddles in place; True if any pair overlapped.
+
+    Each goes back by half of the overlap and both take the mean of their normal
+    velocities. A prescribed paddle does not yield: the other goes back by all of it and takes
+    the prescribed one's normal velocity.
+
+    Args:
+        position: (paddles, 2) m, changed in place.
+        velocity: (paddles, 2) m/s, changed in place.
+        prescribed: (paddles,) bool.
+        lifted: (paddles,) bool: touches nothing.
+        diameter: distance of two centres in contact, m.
+    """
+    met = False
+    for i in range(len(prescribed) - 1):
+        for j in range(i + 1, len(prescribed)):
+            nx = position[j, 0] - position[i, 0]
+            ny = position[j, 1] - position[i, 1]
+            distance = np.sqrt(nx * nx + ny * ny)
+            if distance >= diameter or (prescribed[i] and prescribed[j]):
+                continue
+            if lifted[i] or lifted[j]:
+                continue
+            met = True
+            if distance > 1e-9:
+                nx, ny = nx / distance, ny / distance
+            else:
+                nx, ny = 1.0, 0.0
+            share = 0.5
+            if prescribed[i] != prescribed[j]:
+                share = 1.0 if prescribed[j] else 0.0
+            back, forth = share * (diameter - distance), 1.0 - share
+            forth *= diameter - distance
+            position[i, 0] -= back * nx
+            position[i, 1] -= back * ny
+            position[j, 0] += forth * nx
+            position[j, 1] += forth * ny
+            vi = velocity[i, 0] * nx + velocity[i, 1] * ny
+            vj = velocity[j, 0] * nx + velocity[j, 1] * ny
+            if vi > vj:
+                common = (1.0 - share) * vi + share * vj
+                velocity[i, 0] += (common - vi) * nx
+                velocity[i, 1] += (common - vi) * ny
+                velocity[j, 0] += (common - vj) * nx
+                velocity[j, 1] += (common - vj) * ny
+    return met

@@ -1,0 +1,100 @@
+"""The laws of the kernel: how discs meet walls, goal lines, obstacles, each other.
+
+They are Chipmunk's, written for discs: positions move first, a contact sees the
+velocity from before the pull of the slope, and takes an overlap back in the next
+substep. Functions of plain numbers, so that a compiler keeps them in registers: metres,
+m/s. A contact is its depth (above 0 if they touch) and its unit normal.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.types import Array
+
+SLOP = 1e-4
+"""m: overlap that a contact keeps, so that what rests stays in contact."""
+
+
+@njit(cache=True, error_model="numpy")
+def bounce(before: float, now: float, restitution: float) -> float:
+    """The normal speed that a contact adds.
+
+    Args:
+        before: normal speed before this substep's forces; below 0 if closing.
+        now: the same after them.
+        restitution: share of the closing speed that is given back.
+    """
+    return max(-(restitution * before + now), 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def take_back(depth: float, taken: float) -> float:
+    """What is to be added to the way that takes an overlap back, m."""
+    return max(depth - SLOP - taken, 0.0)
+
+
+@njit(cache=True, error_model="numpy")
+def meet_disc(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
+    """Two discs, the second (dx, dy) from the first: depth and normal toward it."""
+    square = dx * dx + dy * dy
+    if square >= reach * reach:
+        return -1.0, 1.0, 0.0
+    distance = np.sqrt(square)
+    if distance < 1e-9:
+        return reach, 1.0, 0.0
+    return reach - distance, dx / distance, dy / distance
+
+
+@njit(cache=True, error_model="numpy")
+def meet_side(
+    x: float, y: float, radius: float, lines: Array, s: int
+) -> tuple[float, float, float]:
+    """A disc and side ``s`` of `rails.sides`, with a goal line in its middle."""
+    nx, ny = lines[s, 0], lines[s, 1]
+    ahead = nx * x + ny * y + lines[s, 2]
+    if ahead >= radius:
+        return -1.0, nx, ny
+    half = lines[s, 5]
+    aside = nx * (y - lines[s, 4]) - ny * (x - lines[s, 3])
+    if abs(aside) >= half:
+        return radius - ahead, nx, ny
+    # In the goal line: its nearer post or, behind the line, the wall beside it.
+    gap = aside - (half if aside >= 0.0 else -half)
+    depth, along, across = meet_disc(gap, max(ahead, 0.0), radius)
+    return depth, across * nx - along * ny, across * ny + along * nx
+
+
+@njit(cache=True, error_model="numpy")
+def through(x: float, y: float, lines: Array, s: int) -> bool:
+    """Whether a centre has passed the goal line in side ``s`` of `rails.sides`."""
+    nx, ny = lines[s, 0], lines[s, 1]
+    aside = nx * (y - lines[s, 4]) - ny * (x - lines[s, 3])
+    return bool(nx * x + ny * y + lines[s, 2] < 0.0 and abs(aside) < lines[s, 5])
+
+
+@njit(cache=True, error_model="numpy")
+def meet_obstacle(
+    x: float, y: float, radius: float, obstacles: Array, o: int
+) -> tuple[float, float, float]:
+    """A disc and a fixed disc or rounded segment, a row x, y, x, y, radius."""
+    ax, ay = obstacles[o, 0], obstacles[o, 1]
+    lx, ly = obstacles[o, 2] - ax, obstacles[o, 3] - ay
+    square = lx * lx + ly * ly
+    share = ((x - ax) * lx + (y - ay) * ly) / square if square > 0.0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    dx, dy = x - ax - share * lx, y - ay - share * ly
+    return meet_disc(dx, dy, radius + obstacles[o, 4])
+
+
+@njit(cache=True, error_model="numpy")
+def rub(speed: float, loss: float) -> float:
+    """Coulomb friction: the share of a speed that is left after ``loss`` m/s."""
+    return (speed - loss) / speed if speed > loss else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def cap(speed: float, most: float) -> float:
+    """The share of a speed that is left so that it is at most ``most``."""
+    return most / speed if speed > most else 1.0

@@ -1,0 +1,5 @@
+"""A UR5e a seat, in MuJoCo."""
+
+from marl_airhockey.backends.robosuite.backend import make
+
+__all__ = ["make"]

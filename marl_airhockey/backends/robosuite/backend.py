@@ -1,0 +1,207 @@
+"""A UR5e a seat on a table in MuJoCo, built with robosuite."""
+
+from __future__ import annotations
+
+import copy
+import importlib.util
+import logging
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import metadata
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from marl_airhockey.contracts.backend import Backend, Command
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.state import State
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.jit.threads import over_rows
+from marl_airhockey.types import Array
+
+if TYPE_CHECKING:
+    from marl_airhockey.backends.robosuite.camera import Camera
+
+NEWEST = "mujoco==3.9.0"
+COARSEST = 0.004
+"""s of a physics step; with longer ones arms no longer follow."""
+
+
+class Robosuite(Backend):
+    """B MuJoCo simulations of robosuite's model, stepped in compiled code.
+
+    Paddles track their command as an arm can, and feel the pucks; contacts take some
+    milliseconds. A prescribed paddle is asked to go there, at its seat's top speed at most.
+    ``trace`` is what the arms did at every physics step: see `arm.lean.TRACE`.
+    """
+
+    exact: ClassVar[bool] = True
+    ideal: ClassVar[bool] = False
+    default_substeps: ClassVar[int] = 50
+    cameras: ClassVar[tuple[str, ...]] = ("frontview", "agentview", "birdview")
+
+    @classmethod
+    def available(cls) -> str | None:
+        for name in ("robosuite", "mujoco"):
+            if importlib.util.find_spec(name) is None:
+                return (
+                    f"{name} is not installed: pip install 'marl_airhockey[robosuite]'"
+                )
+        version = metadata.version("mujoco")
+        if tuple(int(n) for n in version.split(".")[:2]) > (3, 9):
+            return f"mujoco {version} is too new for robosuite: pip install {NEWEST}"
+        return None
+
+    @classmethod
+    def supports(cls, scene: Scene) -> str | None:
+        table, seats = scene.table, scene.seats
+        if table.vertices != TABLES["standard"].vertices:
+            return "arms are placed for the standard table"
+        sides = [seat.side for seat in seats]
+        if len(set(sides)) < len(sides) or not set(sides) <= {0, 2}:
+            return "there is room for one arm at each end"
+        for i, seat in enumerate(seats):
+            held = make_seat("robot", table, seat.side)
+            if seat.reach != held.reach or seat.speed > held.speed:
+                return f"an arm cannot hold the seat of paddle_{i}: say seats='robot'"
+        if scene.blocks and any(goal_line.width for goal_line in scene.goal_lines):
+            return "blocks could slide into a goal line; leave out one or the other"
+        return None
+
+    def __init__(
+        self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
+    ) -> None:
+        super().__init__(scene, num_worlds, control_dt, substeps)
+        if control_dt / substeps > COARSEST:
+            least = math.ceil(control_dt / COARSEST - 1e-9)
+            raise ValueError(
+                f"substeps: {substeps} are too few to hold an arm: at least {least}"
+            )
+        # Without a screen; MuJoCo reads it when it is imported.
+        os.environ.setdefault("MUJOCO_GL", "egl")
+        # Robosuite warns of files that nobody needs; errors are shown.
+        log = logging.getLogger("robosuite_logs")
+        log.addFilter(lambda record: record.levelno >= logging.ERROR)
+        from marl_airhockey.backends.robosuite.env import AirHockey
+        from marl_airhockey.backends.robosuite.simulation import Arms
+        from marl_airhockey.backends.robosuite.stepper import TRACE, Table
+
+        self._dt = control_dt / substeps
+        env: Any = AirHockey(
+            scene=scene, timestep=self._dt, control_freq=1 / control_dt
+        )
+        env.reset()
+        model, data = env.lean_model(), env.sim.data._data
+        self.env = env
+        """The robosuite environment whose model all worlds copy."""
+        place, goal_lines = env.place, scene.goal_lines
+        self._table = Table(
+            origin=place.origin,
+            rotation=place.rotation,
+            grips=np.array([hand.grip for hand in env.hands]),
+            low=np.array([hand.low for hand in env.hands]),
+            high=np.array([hand.high for hand in env.hands]),
+            radius=np.array([scene.table.paddle_radius, scene.table.puck_radius]),
+            pucks=scene.pucks,
+            normals=np.array([scene.table.normals[m.side] for m in goal_lines]).reshape(
+                -1, 2
+            ),
+            offsets=np.array([scene.table.offsets[m.side] for m in goal_lines]),
+            ways=np.array([scene.opening(m) for m in goal_lines]).reshape(-1, 2, 2),
+            whole=np.array([m.width is None for m in goal_lines], np.bool_),
+        )
+        self.trace = np.zeros((num_worlds, substeps, len(scene.seats), len(TRACE)))
+        self.worlds = [
+            Arms(env, copy.copy(model), self._path_shape[1:], self.trace[i], data)
+            for i in range(num_worlds)
+        ]
+        self._old = np.zeros((num_worlds, len(scene.seats), 2))
+        self.state = self.rest_state
+        self._cameras: dict[int, Camera] = {}
+
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        for i in worlds.tolist():
+            row = {name: float(value[i]) for name, value in values.items()}
+            self.worlds[i].set_physics(row)
+
+    def start(self, state: State, worlds: Array) -> None:
+        self.state = state
+        for i in worlds.tolist():
+            new = self.worlds[i].start(
+                self._table, state.position[i], state.velocity[i], state.angle[i]
+            )
+            if new:
+                self._old[i] = 0.0
+
+    def step(self, command: Command) -> State:
+        from marl_airhockey.backends.robosuite.stepper import advance
+
+        velocity, prescribed, _ = self._follow(command, self.state.position)
+        top = np.array([seat.speed for seat in self.scene.seats])[:, None]
+        size = np.hypot(velocity[..., 0], velocity[..., 1])[..., None]
+        slow = np.minimum(1.0, top / np.maximum(size, 1e-9))
+        goal = np.where(prescribed[..., None], velocity * slow, velocity)
+        arrays: dict[str, Any] = {
+            name: getattr(self.state, name).copy()
+            for name in ("position", "velocity", "angle", "spin")
+        }
+        events: dict[str, list[Array]] = {}
+        path = np.empty(self._path_shape)
+        starts = [
+            world.lead(self._old[i], goal[i], self.control_dt)
+            for i, world in enumerate(self.worlds)
+        ]
+
+        def move(rows: slice) -> None:
+            for i in range(*rows.indices(self.num_worlds)):
+                world = self.worlds[i]
+                advance(
+                    world.sim,
+                    self._table,
+                    world.report,
+                    starts[i],
+                    self._old[i],
+                    goal[i],
+                    self._dt,
+                    self.substeps,
+                )
+
+        over_rows(move, self.num_worlds, least=1)
+        for i, world in enumerate(self.worlds):
+            world.retire()
+            world.read(arrays, i)
+            path[i] = world.report.path
+            for name, value in world.events.items():
+                events.setdefault(name, []).append(value.copy())
+        self._old[:] = goal
+        arrays |= {name: np.array(rows) for name, rows in events.items()}
+        self.state = replace(
+            self.rest_state,
+            **arrays,
+            time=self.state.time + self.control_dt,
+            path=path if self.scene.path else None,
+        )
+        return self.state
+
+    def photograph(
+        self, world: int, camera: str, marks: Sequence[Mark], width: int
+    ) -> Array:
+        from marl_airhockey.backends.robosuite.camera import Camera
+
+        if width not in self._cameras:
+            model, height = self.env.sim.model._model, round(width * 0.6)
+            self._cameras[width] = Camera(model, self.env.place, width, height)
+        places = self.worlds[world].data.qpos
+        return self._cameras[width].picture(places, camera, marks)
+
+    def close(self) -> None:
+        for camera in self._cameras.values():
+            camera.close()
+        self.env.close()
+
+
+make = Robosuite

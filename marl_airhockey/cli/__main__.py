@@ -1,0 +1,5 @@
+"""``python -m marl_airhockey.cli``."""
+
+from marl_airhockey.cli.main import main
+
+main()

@@ -1,0 +1,77 @@
+"""Bench: see the definitions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import (
+    AsJson,
+    Workers,
+    app,
+    bar,
+    console,
+)
+from marl_airhockey.core.errors import require
+
+
+@app.command("bench")
+def bench_environments(
+    scenario: Annotated[str, typer.Option(help="Comma-separated.")] = "juggle",
+    backend: Annotated[str, typer.Option(help="Comma-separated.")] = "numba,pymunk",
+    worlds: Annotated[
+        str, typer.Option(help="Comma-separated; 0 is the PettingZoo dict environment.")
+    ] = "0,1,64,1024,4096",
+    rounds: Annotated[int, typer.Option(help="Turns.")] = 3,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds of a turn.")] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Draw a PNG here.")] = None,
+    num_workers: Workers = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure env-steps per second, of CPU and of time."""
+    from marl_airhockey.evaluation.speed import Case, measure, picture
+
+    try:
+        numbers = [int(n) for n in worlds.split(",")]
+    except ValueError:
+        raise ValueError(f"--worlds: {worlds!r} must be numbers and commas") from None
+    if min(numbers) < 0 or rounds < 1 or seconds <= 0:
+        raise ValueError("--worlds, --rounds and --seconds must not be negative or 0")
+    cases = [
+        Case(s, b, n)
+        for s in scenario.split(",")
+        for b in backend.split(",")
+        for n in numbers
+    ]
+    with bar() as progress:
+        task = progress.add_task("measuring", total=rounds * len(cases), note="")
+        rates = measure(cases, rounds, seconds, lambda: progress.advance(task))
+    if out is not None:
+        require("matplotlib", "train")
+        picture(rates, out)
+    if as_json:
+        console.print_json(json.dumps([rate.to_json() for rate in rates]))
+        return
+    table = Table(
+        title=f"{rounds} turns of {seconds} CPU-s, {rates[0].threads} threads"
+    )
+    for name in ("scenario", "backend", ""):
+        table.add_column(name)
+    for name in ("env-steps per CPU-s", "agent-steps per CPU-s", "per s", "spread"):
+        table.add_column(name, justify="right")
+    for rate in rates:
+        speeds = (rate.env_steps_per_cpu_s, rate.agent_steps_per_cpu_s)
+        table.add_row(
+            rate.case.scenario,
+            rate.case.backend,
+            rate.case.name,
+            *(f"{speed:,.0f}" for speed in (*speeds, rate.env_steps_per_s)),
+            f"{rate.spread:.0%}",
+        )
+    console.print(table)
+    if out is not None:
+        console.print(f"wrote {out}")

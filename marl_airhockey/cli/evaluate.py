@@ -1,0 +1,106 @@
+"""Evaluate: see the definitions."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import (
+    AsJson,
+    Backend,
+    Drivers,
+    Options,
+    Physics,
+    Profile,
+    Scenario,
+    Workers,
+    app,
+    bar,
+    console,
+    environment,
+)
+from marl_airhockey.evaluation.evaluate import TEST_SEED, Result, evaluate
+from marl_airhockey.registry import make_driver
+from marl_airhockey.toolkit.policies import Policy
+
+FLOORS = ("still", "random", "sticky")
+
+
+@app.command("evaluate")
+def evaluate_driver(
+    driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
+    scenario: Scenario,
+    backend: Backend = "pymunk",
+    profile: Profile = "ideal",
+    episodes: Annotated[int, typer.Option(help="How many.")] = 200,
+    seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,
+    option: Options = None,
+    other: Drivers = None,
+    physics: Physics = None,
+    floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
+    num_workers: Workers = None,
+    as_json: AsJson = False,
+) -> None:
+    """Measure a driver over episodes that training never sees."""
+    keywords = environment(backend, profile, option, other, physics)
+    if episodes < 1:
+        raise ValueError(f"--episodes: {episodes} must be at least 1")
+    seated = make_driver(driver)
+    entries = [(driver, seated)]
+    if isinstance(seated, Policy):
+        sampled = replace(seated, deterministic=False)
+        entries.append((f"{driver} (sampled)", sampled))
+    if floors:
+        entries += [(f, make_driver(f)) for f in FLOORS if f != driver]
+    results: list[Result] = []
+    with bar() as progress:
+        task = progress.add_task(scenario, total=len(entries), note="")
+        for name, entry in entries:
+            progress.update(task, note=name)
+            results.append(evaluate(entry, name, scenario, episodes, seed, keywords))
+            progress.advance(task)
+    if as_json:
+        main_result = results[0].to_json()
+        for result in results[1:]:
+            key = "sampled" if "(sampled)" in result.driver else result.driver
+            main_result.setdefault("beside", {})[key] = result.to_json()
+        console.print_json(json.dumps(main_result))
+        return
+    console.print(result_table(results))
+
+
+def result_table(results: list[Result]) -> Table:
+    """Results side by side, one column a driver."""
+    first = results[0]
+    table = Table(
+        title=f"{first.scenario} on {first.backend}, {first.profile} profile, "
+        f"{first.episodes} episodes",
+    )
+    table.add_column("")
+    for result in results:
+        table.add_column(result.driver, justify="right")
+    lines: dict[str, Callable[[Result], str]] = {
+        "success": lambda r: f"{r.success:.3f}",
+        "  95 % from": lambda r: f"{r.success_interval[0]:.3f}",
+        "  95 % to": lambda r: f"{r.success_interval[1]:.3f}",
+        "first-shot success": lambda r: f"{r.first_shot:.3f}",
+        "return": lambda r: f"{r.returns:.2f}",
+        "  interquartile": lambda r: f"{r.returns_iqm:.2f}",
+        "  95 % from ": lambda r: f"{r.returns_interval[0]:.2f}",
+        "  95 % to ": lambda r: f"{r.returns_interval[1]:.2f}",
+        "control steps": lambda r: f"{r.length:.0f}",
+        "touches": lambda r: f"{r.hits:.1f}",
+        "violations a minute": lambda r: f"{r.deployability.violations_per_minute:.0f}",
+        "jerk, m/s3": lambda r: f"{r.deployability.jerk:.0f}",
+        "power above 5 Hz": lambda r: f"{r.deployability.power_above_5hz:.2f}",
+        "ms an action": lambda r: f"{r.deployability.act_ms:.2f}",
+        "deployability": lambda r: r.deployability.grade,
+    }
+    for name, line in lines.items():
+        table.add_row(name, *(line(result) for result in results))
+    return table

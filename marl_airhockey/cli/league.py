@@ -1,0 +1,126 @@
+"""Commands for games: ``airhockey league``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import (
+    AsJson,
+    Backend,
+    Options,
+    Profile,
+    bar,
+    console,
+    environment,
+)
+from marl_airhockey.core.errors import require
+from marl_airhockey.evaluation.league import found_in
+from marl_airhockey.evaluation.league import league as play_league
+from marl_airhockey.evaluation.standings import Standings
+from marl_airhockey.registry import make_driver
+
+SCRIPTS = (
+    "random",
+    *(
+        f"{script}:strength={strength}"
+        for script in ("goalkeeper", "striker", "allround")
+        for strength in ("weak", "fair", "strong")
+    ),
+)
+
+
+def league(
+    scenario: Annotated[str, typer.Argument(help="A game of two teams.")],
+    players: Annotated[
+        list[str] | None,
+        typer.Argument(help="Drivers and policies; all scripts if none are given."),
+    ] = None,
+    folder: Annotated[
+        Path | None, typer.Option(help="Every policy and run in it plays, too.")
+    ] = None,
+    games: Annotated[int, typer.Option(help="Of each pair.", min=2)] = 100,
+    out: Annotated[Path, typer.Option(help="Folder of table and picture.")] = Path(
+        "runs/league"
+    ),
+    backend: Backend = "numba",
+    profile: Profile = "ideal",
+    option: Options = None,
+    exploit: Annotated[
+        int | None,
+        typer.Option(help="Train a best response to each policy for so many steps."),
+    ] = None,
+    exploit_seeds: Annotated[
+        int, typer.Option(help="Best responses to each, of seeds 0 .. N - 1.", min=1)
+    ] = 1,
+    as_json: AsJson = False,
+) -> None:
+    """Let everybody play everybody: ratings, matrix, circles."""
+    require("matplotlib", "train")
+    names = list(players or ([] if folder else SCRIPTS))
+    names += found_in(folder) if folder else []
+    keywords = environment(backend, profile, option, None)
+    entrants = {label(name, names): make_driver(name) for name in names}
+    standings = play_league(scenario, entrants, games, keywords=keywords)
+    files = standings.save(out)
+    responses: dict[str, list[float]] = {}
+    if exploit:
+        responses = best_responses(scenario, names, exploit, exploit_seeds, out)
+        (out / "exploitability.json").write_text(json.dumps(responses, indent=1))
+    if as_json:
+        report = {**standings.to_json(), "best_responses": responses}
+        console.print_json(json.dumps(report))
+        return
+    console.print(table(standings))
+    for circle in standings.circles:
+        console.print("circle:", " > ".join((*circle, circle[0])))
+    for name, scores in responses.items():
+        shown = ", ".join(f"{score:.3f}" for score in scores)
+        console.print(f"best response to {name} after {exploit:,} steps: {shown}")
+    console.print("files:", *files)
+
+
+def label(name: str, names: list[str]) -> str:
+    """A path by its end, as long as that is nobody else's."""
+    short = "/".join(Path(name).parts[-2:])
+    return short if sum(n.endswith(short) for n in names) == 1 else name
+
+
+def best_responses(
+    scenario: str, names: list[str], steps: int, seeds: int, out: Path
+) -> dict[str, list[float]]:
+    """The scores of what learned to beat each player, in as many steps, by seed."""
+    require("stable_baselines3", "train")
+    from marl_airhockey.learn.best_response import best_response
+
+    found: dict[str, list[float]] = {name: [] for name in names}
+    with bar() as progress:
+        task = progress.add_task("best responses", total=seeds * len(names), note="")
+        for number, name in enumerate(names):
+            progress.update(task, note=name)
+            for seed in range(seeds):
+                run = out / "responses" / f"{number}-{steps}-{seed}"
+                found[name].append(best_response(scenario, name, steps, run, seed))
+                progress.advance(task)
+    return found
+
+
+def table(standings: Standings) -> Table:
+    """The league, the best first."""
+    shown = Table("player", "Elo", "95 %", "score", "won", "drawn", "lost", "goals")
+    for row in standings.rows():
+        shown.add_row(
+            row["player"],
+            f"{row['elo']:.0f}",
+            f"{row['elo_low']:.0f}..{row['elo_high']:.0f}",
+            f"{row['score']:.3f}",
+            f"{row['wins']}",
+            f"{row['rng']}",
+            f"{row['losses']}",
+            f"{row['goal_difference']:+.2f}",
+        )
+    return shown

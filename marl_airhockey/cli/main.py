@@ -1,0 +1,44 @@
+"""The command line: ``airhockey list | train | evaluate | watch | play | league``..."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from marl_airhockey.cli import (
+    bench,
+    evaluate,
+    league,
+    listing,
+    play,
+    study,
+    train,
+    transfer,
+    watch,
+)
+from marl_airhockey.cli.options import app
+
+# Each of these defines its commands on the application.
+__all__ = ["bench", "evaluate", "listing", "main", "train", "watch"]
+app.command()(league.league)
+app.command()(play.play)
+app.command()(transfer.transfer)
+app.command()(transfer.fit)
+record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
+record.command()(play.report)
+app.add_typer(record, name="record")
+app.add_typer(study.study, name="study")
+
+
+def main() -> None:
+    """Run the command line; bad input gives one line and exit status 1."""
+    try:
+        app()
+    except (ValueError, RuntimeError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

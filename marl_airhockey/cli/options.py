@@ -1,0 +1,118 @@
+"""What the commands share: the application, options, the progress bar."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from marl_airhockey.core.physics import load_physics
+from marl_airhockey.jit.threads import use_threads
+from marl_airhockey.world.build import Keywords
+
+if TYPE_CHECKING:
+    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.grade import Grades
+
+app = typer.Typer(
+    help="Air hockey for robot learning and multi-agent RL.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+console = Console()
+
+Scenario = Annotated[str, typer.Option("--scenario", "-s", help="Name of a scenario.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Backend = Annotated[str, typer.Option(help="Physics.")]
+Profile = Annotated[str, typer.Option(help="ideal, or robot: delays and noise.")]
+Options = Annotated[
+    list[str] | None,
+    typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
+]
+Physics = Annotated[
+    Path | None, typer.Option(help="A preset of physics, TOML; see airhockey fit.")
+]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--num-workers",
+        help="Threads that step the worlds; else MARL_AIRHOCKEY_THREADS says, or 1.",
+        min=1,
+        callback=use_threads,
+    ),
+]
+Drivers = Annotated[
+    list[str] | None,
+    typer.Option("--driver", help="Who drives another seat, AGENT=NAME; repeatable."),
+]
+
+
+def settings(pairs: list[str] | None) -> dict[str, Any]:
+    """NAME=VALUE pairs; values as in TOML, bare words as strings.
+
+    Raises:
+        ValueError: a pair without "=".
+    """
+    chosen: dict[str, Any] = {}
+    for pair in pairs or []:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise ValueError(f"{pair!r}: expected NAME=VALUE")
+        try:
+            chosen[name] = tomllib.loads(f"v = {value}")["v"]
+        except tomllib.TOMLDecodeError:
+            chosen[name] = value
+    return chosen
+
+
+def environment(
+    backend: str,
+    profile: str,
+    option: list[str] | None,
+    driver: list[str] | None,
+    physics: Path | None = None,
+) -> Keywords:
+    """Keywords of an environment from the options that commands share."""
+    return {
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+        "drivers": settings(driver),
+        "physics": load_physics(physics) if physics is not None else {},
+    }
+
+
+def grade(row: dict[str, float]) -> str:
+    """What an evaluation in training says how good a policy is by."""
+    return "success" if "success" in row else "score"
+
+
+def bar() -> Progress:
+    """A progress bar on standard error, so that output can be piped."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[note]}"),
+        console=Console(stderr=True),
+    )
+
+
+def train_shown(config: TrainConfig | None, folder: Path) -> Grades:
+    """`learn.train.train` with a progress bar."""
+    from marl_airhockey.learn.train import train
+
+    with bar() as progress:
+        task = progress.add_task(folder.name, total=None, note="")
+
+        def report(done: int, total: int, row: dict[str, float]) -> None:
+            name = grade(row)
+            note = f"{name} {row[name]:.2f}" if row else ""
+            progress.update(task, completed=done, total=total, note=note)
+
+        return train(config, folder, report)

@@ -1,0 +1,117 @@
+"""The commands ``airhockey study new | orders | run | list | erase``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import console
+from marl_airhockey.cli.play import Browser, Host, Port, host_table
+from marl_airhockey.core.errors import require
+
+study = typer.Typer(
+    help="Studies: participants play opponents in a planned order.",
+    no_args_is_help=True,
+)
+File = Annotated[Path, typer.Argument(help="A plan, TOML.")]
+Folder = Annotated[Path, typer.Option("--out", help="What is recorded goes here.")]
+
+
+@study.command()
+def new(file: File) -> None:
+    """Write an example of a plan, to be changed."""
+    from marl_airhockey.study.plan import EXAMPLE
+
+    try:
+        with file.open("x") as target:
+            target.write(EXAMPLE.read_text())
+    except OSError as error:
+        raise ValueError(f"{file}: {error.strerror}") from error
+    console.print(f"wrote {file}; airhockey study orders {file} shows who meets whom")
+
+
+@study.command()
+def orders(
+    file: File,
+    participants: Annotated[int, typer.Option(help="How many.", min=1)] = 12,
+) -> None:
+    """Print the order in which participants meet the opponents of a plan."""
+    require("starlette", "play")
+    from marl_airhockey.study.plan import load
+    from marl_airhockey.study.study import open_court
+
+    plan = load(file)
+    open_court(plan).close()
+    table = Table("participant")
+    for k in range(plan.blocks):
+        table.add_column(f"block {k + 1}", overflow="fold")
+    for number in range(participants):
+        labels = [o.label for o in plan.opponents] or [plan.scenario]
+        table.add_row(str(number), *(labels[k] for k in plan.sequence(number)))
+    console.print(table)
+
+
+@study.command()
+def run(
+    file: File,
+    out: Folder,
+    host: Host = "127.0.0.1",
+    port: Port = 8480,
+    browser: Browser = True,
+) -> None:
+    """Serve a study in the browser, one participant after the other."""
+    require("starlette", "play")
+    require("uvicorn", "play")
+    from marl_airhockey.play.server import application
+    from marl_airhockey.study.archive import claim
+    from marl_airhockey.study.plan import load
+    from marl_airhockey.study.study import Study
+
+    plan = load(file)
+    claim(out, file)
+    with console.status("preparing the table (longer when it is the first time)"):
+        session = Study(plan, out)
+    host_table(lambda door: application(session, door), plan.title, host, port, browser)
+    if session.failure is not None:
+        raise session.failure
+
+
+@study.command("list")
+def list_participants(
+    folder: Annotated[Path, typer.Argument(help="Of the study.")],
+) -> None:
+    """List participants: number, code, how far they came."""
+    from marl_airhockey.study.archive import diaries
+
+    table = Table("number", "code", "began", "games", "blocks answered", "state")
+    for diary in diaries(folder):
+        rows = diary.rows
+        if rows[0]["role"] != "participant":
+            continue
+        games = [row for row in rows if row["kind"] == "game" and not row["practice"]]
+        blocks = {row["block"] for row in rows if row["kind"] == "answer"}
+        ends = [row["reason"] for row in rows if row["kind"] == "end"]
+        table.add_row(
+            str(diary.number),
+            diary.code,
+            rows[0]["at"][:16],
+            str(len(games)),
+            str(len(blocks)),
+            ends[0] if ends else "not ended",
+        )
+    console.print(table)
+
+
+@study.command()
+def erase(
+    folder: Annotated[Path, typer.Argument(help="Of the study.")],
+    code: Annotated[str, typer.Argument(help="That the participant was shown.")],
+) -> None:
+    """Erase all that is kept of a participant."""
+    from marl_airhockey.study.archive import erase as delete
+
+    console.print(f"erased {delete(folder, code)} files of {code}")
+    console.print("reports elsewhere may still name them: make them again")

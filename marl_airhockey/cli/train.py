@@ -1,0 +1,146 @@
+"""Train: see the definitions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from marl_airhockey.cli.evaluate import result_table
+from marl_airhockey.cli.options import (
+    AsJson,
+    Backend,
+    Drivers,
+    Options,
+    Physics,
+    Profile,
+    Workers,
+    app,
+    bar,
+    console,
+    grade,
+    settings,
+    train_shown,
+)
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.physics import load_physics
+
+
+@app.command()
+def train(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
+    seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
+    backend: Backend = "numba",
+    profile: Profile = "ideal",
+    steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+    hidden: Annotated[
+        int | None, typer.Option(help="Units of both layers; the paper's size is 256.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="sb3 in this process (usual), rllib over many.")
+    ] = None,
+    num_env_runners: Annotated[
+        int | None, typer.Option(help="Of rllib: processes that step the worlds.")
+    ] = None,
+    init: Annotated[
+        Path | None, typer.Option(help="Begin with the weights of this run.")
+    ] = None,
+    change: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
+    ] = None,
+    option: Options = None,
+    other: Drivers = None,
+    physics: Physics = None,
+    resume: Annotated[Path | None, typer.Option(help="Go on with this run.")] = None,
+    num_workers: Workers = None,
+    as_json: AsJson = False,
+) -> None:
+    """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
+    from marl_airhockey.learn.config import preset
+
+    if resume is None:
+        changes = settings(change) | {
+            "seed": seed,
+            "backend": backend,
+            "profile": profile,
+            "options": settings(option),
+            "drivers": settings(other),
+        }
+        if physics is not None:
+            changes["physics"] = load_physics(physics)
+        if steps is not None:
+            changes["total_steps"] = steps
+        if hidden is not None:
+            changes["hidden"] = [hidden, hidden]
+        if init is not None:
+            changes["init"] = str(init)
+        if engine is not None:
+            changes["engine"] = engine
+        if num_env_runners is not None:
+            changes["num_env_runners"] = num_env_runners
+        config = preset(scenario, changes)
+        folder = out or Path("runs") / f"{scenario}-{seed}"
+    else:
+        given = (scenario, change, option, other, steps, hidden, out, engine)
+        if any(given) or any(x is not None for x in (num_env_runners, init, physics)):
+            raise ValueError("--resume goes on as the run was begun: give nothing else")
+        config, folder = None, resume
+    row = train_shown(config, folder)
+    if as_json:
+        console.print_json(json.dumps({"run": str(folder), **row}))
+        return
+    console.print(
+        f"{folder}: {grade(row)} {row[grade(row)]:.3f} after {row['steps']:,.0f} steps "
+        f"and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
+    )
+    name = scenario or "SCENARIO"
+    console.print(f"next: airhockey evaluate {folder} --scenario {name}")
+
+
+@app.command()
+def export(
+    run: Annotated[Path, typer.Argument(help="Folder of a training run.")],
+    out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
+) -> None:
+    """Freeze a trained policy into one small file with a card, measured anew."""
+    require("stable_baselines3", "train")
+    from marl_airhockey.learn.export import export as freeze
+
+    console.print_json(json.dumps(dict(freeze(run, out).card)))
+    console.print(f"{out}: {out.stat().st_size / 1000:.0f} kB")
+
+
+@app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for what it makes.")] = Path(
+        "runs/demo"
+    ),
+    scenario: Annotated[str, typer.Option(help="What to learn.")] = "juggle",
+    steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+) -> None:
+    """Train a paddle to juggle, measure it, and show what it learned."""
+    require("stable_baselines3", "train")
+    from marl_airhockey.learn.demo import run
+
+    with bar() as progress:
+        task = progress.add_task(f"learning to {scenario}", total=None, note="")
+
+        def report(done: int, total: int, row: dict[str, float]) -> None:
+            name = grade(row)
+            note = f"{name} {row[name]:.2f}" if row else ""
+            progress.update(task, completed=done, total=total, note=note)
+
+        results, files = run(scenario, out, steps, report)
+    console.print(result_table(results))
+    for what, path in files.items():
+        console.print(f"{what:>16}: {path}")
+    console.print(
+        "\ntry next:\n"
+        f"  airhockey watch {out / 'run'} --scenario {scenario}\n"
+        "  airhockey train hit_goal && airhockey evaluate runs/hit_goal-0 -s hit_goal\n"
+        "  airhockey list"
+    )

@@ -1,0 +1,177 @@
+"""The commands ``airhockey transfer | fit``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import (
+    AsJson,
+    Options,
+    Physics,
+    Workers,
+    bar,
+    console,
+    settings,
+    train_shown,
+)
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.core.errors import require, unknown_name
+from marl_airhockey.core.physics import PARAMETERS, PROFILES, load_physics
+from marl_airhockey.registry import find_backend, make_driver, make_scenario
+from marl_airhockey.world.build import Keywords
+
+if TYPE_CHECKING:
+    from marl_airhockey.learn.config import TrainConfig
+
+
+def transfer(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")],
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="A policy or run; repeatable. None: two are trained in --out, one "
+            "in each profile, unless they are there."
+        ),
+    ] = None,
+    to: Annotated[
+        str, typer.Option(help="Backends, comma-separated.")
+    ] = "numba,pymunk,robosuite",
+    profile: Annotated[
+        str, typer.Option(help="Profiles, comma-separated.")
+    ] = "ideal,robot",
+    episodes: Annotated[int, typer.Option(help="Of each.", min=1)] = 200,
+    fine_tune: Annotated[
+        int,
+        typer.Option(help="Steps by which runs are trained on, on robosuite.", min=0),
+    ] = 0,
+    seed: Annotated[int, typer.Option(help="Of training.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of runs and results.")
+    ] = None,
+    option: Options = None,
+    num_workers: Workers = None,
+    as_json: AsJson = False,
+) -> None:
+    """How do policies from the 2D table do elsewhere? Success with 95 % intervals."""
+    from marl_airhockey.transfer.measure import measure, picture, schooled, tuned
+
+    folder = out or Path("runs") / f"transfer-{scenario}"
+    # All that may be wrong is looked at before anything takes time.
+    backends, profiles = _list(to), _list(profile)
+    for backend in backends:
+        find_backend(backend)
+    for kind in profiles:
+        if kind not in PROFILES:
+            raise ValueError(unknown_name("profile", kind, PROFILES))
+    make_scenario(scenario, **settings(option))
+    for name in policy or []:
+        make_driver(name)
+    names = list(policy or [])
+    if not names:
+        for kind in PROFILES:
+            names.append(_run(folder / kind, schooled(scenario, kind, seed)))
+    if fine_tune:
+        runs = [n for n in names if (Path(n) / "config.toml").exists()]
+        if not runs:
+            raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
+        for name in runs:
+            run = folder / f"{Path(name).name}-tuned-{fine_tune}"
+            names.append(_run(run, tuned(Path(name), fine_tune)))
+    policies: dict[str, Driver] = {}
+    for name in names:
+        short = Path(name).name if Path(name).exists() else name
+        policies[name if short in policies else short] = make_driver(name)
+    with bar() as progress:
+        total = len(policies) * len(backends) * len(profiles)
+        task = progress.add_task("measuring", total=total, note="")
+        rows = measure(
+            policies,
+            scenario,
+            backends,
+            profiles,
+            episodes,
+            {"options": settings(option)},
+            lambda: progress.advance(task),
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    data = json.dumps([row.to_json() for row in rows], indent=1)
+    (folder / "transfer.json").write_text(data)
+    require("matplotlib", "train")
+    picture(rows, folder / "transfer.png")
+    if as_json:
+        console.print_json(data)
+        return
+    table = Table("policy", "in", title=f"{scenario}: success in {episodes} episodes")
+    for kind in profiles:
+        table.add_column(f"{kind} profile (95 %)", justify="right")
+    for name in policies:
+        for backend in backends:
+            mine = [r for r in rows if (r.policy, r.backend) == (name, backend)]
+            cells = [
+                f"{r.success:.3f} ({r.interval[0]:.2f}..{r.interval[1]:.2f})"
+                for r in mine
+            ]
+            table.add_row(name, backend, *cells)
+    console.print(table)
+    console.print("files:", folder / "transfer.json", folder / "transfer.png")
+
+
+def _list(names: str) -> list[str]:
+    """The names in a list with commas, each once."""
+    return list(dict.fromkeys(name.strip() for name in names.split(",")))
+
+
+def _run(folder: Path, config: TrainConfig) -> str:
+    """Train what is not trained yet, or not to its end."""
+    begun = (folder / "config.toml").exists()
+    train_shown(None if begun else config, folder)
+    return str(folder)
+
+
+def fit(
+    scenario: Annotated[
+        str, typer.Argument(help="What is played; without blocks.")
+    ] = "juggle",
+    driver: Annotated[
+        str | None, typer.Option(help="Who plays it; of the zoo unless given.")
+    ] = None,
+    backend: Annotated[str, typer.Option(help="Where it is played.")] = "robosuite",
+    physics: Physics = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder of recordings of play, instead of playing."),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Control steps of play.", min=1)] = 3000,
+    seed: Annotated[int, typer.Option(help="Of the play.")] = 0,
+    out: Annotated[Path, typer.Option(help="The preset.")] = Path("fit.toml"),
+) -> None:
+    """Fit the 2D table's physics to play on another one, for --physics FILE."""
+    from marl_airhockey.transfer.system_id import fit as find
+    from marl_airhockey.transfer.system_id import play, recorded
+
+    if recordings is not None:
+        seen = recorded(sorted(recordings.glob("*.jsonl")))
+    else:
+        who = make_driver(driver or f"zoo/{scenario}")
+        there = load_physics(physics) if physics else {}
+        with console.status(f"playing {steps} steps on {backend}"):
+            keywords: Keywords = {"backend": backend, "physics": there}
+            seen = play(scenario, who, steps, seed, keywords)
+    with console.status("fitting"):
+        found = find(seen)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(found.to_toml())
+    table = Table("", "usual values", "fitted", title=f"{found.stretches} stretches")
+    for name, value in found.physics.items():
+        usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
+        table.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
+    for k, name in enumerate(("pucks off, mm", "paddles off, mm")):
+        shown = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
+        table.add_row(name, *shown)
+    console.print(table)
+    console.print(f"{found.closed:.0%} of the pucks' error is gone; wrote {out}")

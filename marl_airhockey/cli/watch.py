@@ -1,0 +1,75 @@
+"""Watch: see the definitions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli.options import (
+    Backend,
+    Drivers,
+    Options,
+    Profile,
+    app,
+    console,
+    environment,
+)
+from marl_airhockey.registry import make_driver
+
+
+@app.command()
+def watch(
+    driver: Annotated[
+        str, typer.Argument(help="A driver's name, a policy's path, or a recording.")
+    ],
+    scenario: Annotated[
+        str, typer.Option("--scenario", "-s", help="What the driver plays.")
+    ] = "",
+    backend: Backend = "pymunk",
+    profile: Profile = "ideal",
+    seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
+    episodes: Annotated[int, typer.Option(help="How many.")] = 1,
+    video: Annotated[
+        Path | None, typer.Option(help="Write a .gif or .mp4 instead of a window.")
+    ] = None,
+    option: Options = None,
+    other: Drivers = None,
+    camera: Annotated[
+        str, typer.Option(help="top, or a camera of the backend: agentview...")
+    ] = "top",
+    host: cli_play.Host = "127.0.0.1",
+    port: cli_play.Port = 0,
+    browser: cli_play.Browser = True,
+) -> None:
+    """Watch a driver play, in a window or as a video; or a recording of play.
+
+    --host, --port and --browser are those of a recording's page.
+    """
+    from marl_airhockey.evaluation.watch import film
+
+    if driver.endswith(".jsonl"):
+        if video is None:
+            cli_play.show(Path(driver), host, port, browser)
+        else:
+            watch_recording(Path(driver), video)
+        return
+    if any(Path(driver).glob("*.jsonl")):
+        raise ValueError(f"{driver}: holds recordings; name one of its .jsonl files")
+    if not scenario:
+        raise ValueError("--scenario: say what the driver is to play")
+    keywords = environment(backend, profile, option, other)
+    player = make_driver(driver)
+    film(scenario, player, keywords, seed, episodes, video, camera=camera)
+    if video is not None:
+        console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
+
+
+def watch_recording(recording: Path, video: Path) -> None:
+    """Make a video of a recording."""
+    from marl_airhockey.play.video import film
+
+    film(recording, video)
+    console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

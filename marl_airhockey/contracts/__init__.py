@@ -1,0 +1,1 @@
+"""What a scenario, a driver and a backend owe."""

@@ -1,0 +1,88 @@
+"""The driver contract: whatever moves a paddle.
+
+A driver *asks* for a velocity (policy, script, mouse) and the backend moves the paddle,
+or it *tells* where the paddle is (a hand under a camera, a robot with its own
+controller) and the backend follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Self
+
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import Seat
+from marl_airhockey.core.state import State
+from marl_airhockey.types import Array
+
+
+@dataclass(frozen=True)
+class View:
+    """What one seat senses in B worlds."""
+
+    scene: Scene
+    """Who and what is on the table."""
+    state: State
+    """The sensed state, rotated into the seat's ego frame."""
+    observation: Array | Mapping[str, Array]
+    """(B, D), or the dict of goals="dict", built with the driver's `observe` option."""
+    labels: tuple[str, ...]
+    """Name of each element of a flat observation."""
+    top_speed: Array
+    """(B,) m/s: what an asked norm of 1 stands for."""
+    reach: Array
+    """(K, 2) corners of the seat's reach, ego frame, m."""
+    rng: RandomStreams
+    """The driver's own random streams, one a world."""
+    seat: int
+    """Index of the seat: its paddle in ``state``."""
+    scenario_memory: Mapping[str, Array] = field(default_factory=dict)
+    """The scenario's memory, (B, *); goals in the table frame."""
+
+
+PrescribedMotion = Array
+"""(B, 4) measured position and velocity of a paddle, ego frame, m and m/s."""
+
+
+class Driver:
+    """Drives one seat in B worlds.
+
+    Policies and scripts are pure: what they keep between steps is the memory, arrays
+    with one row a world.
+    """
+
+    observe: str | None = None
+    """Observation that the driver wants; None for the environment's."""
+    control_dt: float | None = None
+    """s between two decisions, a multiple of the environment's; None for the same."""
+
+    def start(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+        """Memory of ``worlds`` worlds whose episode begins."""
+        return {}
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        """The asked velocity (B, 2) as a fraction of top speed, and the memory.
+
+        A driver that tells never gets here.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not ask")
+
+    def measured(self) -> PrescribedMotion | None:
+        """(B, 4) where the paddle is, if the driver tells; None if it asks."""
+        return None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        return None

@@ -1,0 +1,40 @@
+"""Mark: see the definitions."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from marl_airhockey.core.table import Table
+from marl_airhockey.types import Array
+
+
+class Mark(NamedTuple):
+    """Something to draw on the table that is no body: a goal, a line, an arrow."""
+
+    kind: Literal["circle", "line", "arrow"]
+    start: tuple[float, float]
+    """Centre or first end, m."""
+    end: tuple[float, float] = (0.0, 0.0)
+    """Second end, m."""
+    radius: float = 0.0
+    """m"""
+
+    @staticmethod
+    def circle(centre: Array, radius: float) -> Mark:
+        """A circle, m."""
+        return Mark("circle", (float(centre[0]), float(centre[1])), radius=radius)
+
+    @staticmethod
+    def across(table: Table, x: float) -> Mark:
+        """A line from one long side to the other, m."""
+        wide = float(table.size[1]) / 2
+        return Mark("line", (float(x), -wide), (float(x), wide))
+
+    @staticmethod
+    def arrow(start: Array, way: Array) -> Mark:
+        """An arrow from a point along a way, m."""
+        tip = np.asarray(start) + way
+        first = (float(start[0]), float(start[1]))
+        return Mark("arrow", first, (float(tip[0]), float(tip[1])))

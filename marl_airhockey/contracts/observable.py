@@ -1,0 +1,137 @@
+"""How observations are laid out: columns with bounds, ego frames, pieces side by side.
+
+Vectors are in the seat's ego frame, SI units.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.types import Array, Memory
+
+OBSERVE = ("velocity", "history", "pixels")
+"""What is shown of a puck: position and velocity; the last five sensed positions with a
+visibility flag, as a camera gives them; or pictures."""
+
+
+HISTORY = 5
+
+
+FRAMES = 3
+
+
+class Column(NamedTuple):
+    """One element of an observation.
+
+    ``(value - centre) / unit`` is of order one: the fixed scaling for a network.
+    """
+
+    label: str
+    low: float
+    high: float
+    unit: float
+    centre: float = 0.0
+
+
+@dataclass(frozen=True)
+class ObservationContext:
+    """What pieces need to know to state their columns."""
+
+    scene: Scene
+    observe: str
+    top_speed: float
+
+    @cached_property
+    def extent(self) -> Array:
+        """(2,) largest |x| and |y| of the table in any seat's ego frame, m."""
+        corners = np.asarray(self.scene.table.vertices)
+        turned = [corners @ r.T for r in self.rotations]
+        return np.asarray(np.max(np.abs(turned), axis=(0, 1)))
+
+    @cached_property
+    def rotations(self) -> Array:
+        """(S, 2, 2) from the table frame to each seat's ego frame."""
+        return np.array([self.scene.table.rotation(s.side) for s in self.scene.seats])
+
+    @cached_property
+    def straight(self) -> bool:
+        """True if there is one seat and its ego frame is the table frame."""
+        return len(self.rotations) == 1 and bool(self.rotations[0, 0, 0] == 1.0)
+
+    def place(
+        self, name: str, unit: tuple[float, float], x: float = 0.0
+    ) -> list[Column]:
+        """Columns of a position, centred at (x, 0)."""
+        ex, ey = self.extent
+        return [
+            Column(f"{name}.x", -ex, ex, unit[0], x),
+            Column(f"{name}.y", -ey, ey, unit[1]),
+        ]
+
+    def gap(self, name: str, unit: tuple[float, float]) -> list[Column]:
+        """Columns of the way from one position to another."""
+        ex, ey = 2 * self.extent
+        return [
+            Column(f"{name}.dx", -ex, ex, unit[0]),
+            Column(f"{name}.dy", -ey, ey, unit[1]),
+        ]
+
+    def motion(self, name: str, most: float, unit: float) -> list[Column]:
+        """Columns of a velocity."""
+        return [Column(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
+
+
+class EgoView:
+    """A sensed state and the scenario's memory, seen from every seat."""
+
+    def __init__(
+        self, state: State, memory: Memory, history: Array, scope: ObservationContext
+    ):
+        self.state, self.memory, self.scope = state, memory, scope
+        self.history = history
+        """(..., HISTORY, pucks, 3) sensed positions and visibility, newest last"""
+        self.own = self._own(state.paddle)
+        """(..., S, 2) each seat's own paddle, m"""
+        self.own_velocity = self._own(state.paddle_velocity)
+        """(..., S, 2) m/s"""
+        self.puck = self.turn(state.puck)
+        """(..., S, pucks, 2) m"""
+        self.puck_velocity = self.turn(state.puck_velocity)
+        """(..., S, pucks, 2) m/s"""
+
+    def turn(self, vectors: Array) -> Array:
+        """(..., n, 2) vectors of the table frame to (..., S, n, 2) in ego frames."""
+        seats = vectors[..., None, :, :]
+        if self.scope.straight:
+            return seats
+        turned: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
+        return turned
+
+    def _own(self, vectors: Array) -> Array:
+        if self.scope.straight:
+            return vectors
+        seats = np.arange(vectors.shape[-2])
+        own: Array = self.turn(vectors)[..., seats, seats, :]
+        return own
+
+
+class Observable(ABC):
+    """A part of an observation."""
+
+    goal: bool = False
+    """True for the wanted goal, which goals="dict" shows apart."""
+
+    @abstractmethod
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        """One column for each number."""
+
+    @abstractmethod
+    def write(self, ego: EgoView, out: Array) -> None:
+        """Put the numbers into ``out`` (..., S, columns)."""

@@ -1,0 +1,1 @@
+"""Nouns: table, seats, scene, state, physics, random numbers, limits."""

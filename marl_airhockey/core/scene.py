@@ -1,0 +1,109 @@
+"""Who and what is on the table: the static side of a scenario."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from marl_airhockey.core.seat import Seat
+from marl_airhockey.core.state import Bodies
+from marl_airhockey.core.table import Table
+from marl_airhockey.types import Array
+
+
+@dataclass(frozen=True)
+class GoalLine:
+    """A goal line in the middle of a side, or (``width`` None) the whole side.
+
+    A puck crosses a goal line when its centre passes the side's line there; it crosses
+    a goal line that is a whole side when it touches that wall.
+    """
+
+    name: str
+    side: int
+    width: float | None = None
+    """m"""
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A static disc, or a rounded segment if ``end`` is given."""
+
+    start: tuple[float, float]
+    radius: float
+    end: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Seats, bodies and goal lines of a scenario on its table.
+
+    Raises:
+        ValueError: a body that does not fit, naming the field.
+    """
+
+    table: Table
+    seats: tuple[Seat, ...]
+    pucks: int = 0
+    blocks: int = 0
+    block_radius: float = 0.0377
+    """m; half the side of a square"""
+    block_shape: Literal["disc", "square"] = "disc"
+    obstacles: tuple[Obstacle, ...] = ()
+    goal_lines: tuple[GoalLine, ...] = ()
+    path: bool = False
+    """True if scenarios need positions at every substep."""
+    physics: dict[str, float] = field(default_factory=dict, hash=False)
+    """Physical parameters that this scenario sets, by name."""
+
+    def __post_init__(self) -> None:
+        if not self.seats:
+            raise ValueError("scene.seats: at least one seat is needed")
+        if self.pucks < 0 or self.blocks < 0:
+            raise ValueError("scene: pucks and blocks must not be negative")
+        if not 0 < self.block_radius < self.table.offsets.min():
+            raise ValueError(f"scene.block_radius: {self.block_radius} m does not fit")
+        if self.block_shape not in ("disc", "square"):
+            raise ValueError(f"scene.block_shape: {self.block_shape!r} is not known")
+        for goal_line in self.goal_lines:
+            start, end = self.table.ends(goal_line.side)
+            length = float(((end - start) ** 2).sum() ** 0.5)
+            if goal_line.width is not None and not 0 < goal_line.width < length:
+                raise ValueError(
+                    f"scene.goal_lines: {goal_line.name!r} is wider than its side"
+                )
+
+    def opening(self, goal_line: GoalLine) -> Array:
+        """(2, 2) ends of a goal line, in the order of its side's, m."""
+        start, end = self.table.ends(goal_line.side)
+        if goal_line.width is None:
+            return np.array([start, end])
+        along = (end - start) / np.linalg.norm(end - start) * goal_line.width / 2
+        middle = (start + end) / 2
+        return np.array([middle - along, middle + along])
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """Kinds and radii of all bodies, sorted by kind."""
+        radius = (
+            (self.table.paddle_radius,) * len(self.seats)
+            + (self.table.puck_radius,) * self.pucks
+            + (self.block_radius,) * self.blocks
+            + tuple(o.radius for o in self.obstacles)
+        )
+        counts = (self.pucks, self.blocks, len(self.obstacles))
+        return Bodies(len(self.seats), *counts, radius)
+
+    def goal_line(self, name: str) -> int:
+        """Index of the goal line with this name."""
+        return [m.name for m in self.goal_lines].index(name)
+
+    @cached_property
+    def defaults(self) -> dict[str, float]:
+        """Physical parameters that follow from table, scenario and seats."""
+        seat = self.seats[0]
+        motion = {"paddle_speed": seat.speed, "paddle_acceleration": seat.acceleration}
+        return {**self.table.physics, **self.physics, **motion}

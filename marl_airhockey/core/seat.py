@@ -1,0 +1,133 @@
+"""Seat: see the definitions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+
+from marl_airhockey.core.geometry import clip, half_planes
+from marl_airhockey.core.table import Table
+from marl_airhockey.types import Array
+
+SeatKind = Literal["robot", "arcade"]
+
+
+SEAT_KINDS: tuple[str, ...] = ("robot", "arcade")
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A place at the table: one paddle, what it can reach and how fast it can be."""
+
+    side: int
+    """The side of the table it belongs to."""
+    reach: tuple[tuple[float, float], ...]
+    """Convex polygon of the paddle's centre, ego frame, counter-clockwise, m."""
+    speed: float
+    """Top speed, m/s."""
+    acceleration: float
+    """Largest change of velocity, m/s2."""
+    team: int = 0
+
+
+def make_seat(
+    kind: str, table: Table, side: int, others: tuple[int, ...] = (), team: int = 0
+) -> Seat:
+    """A seat of a kind at a side of a table.
+
+    ``robot``: what a UR5e can hold with its base 0.22 m behind its edge, a box of
+    0.42 x 0.50 m that begins 78 mm from the edge, with far corners cut at the slope of
+    0.8 that the paper's authors use, as far as it lies in the side's territory.
+    ``arcade``: all of the territory. Centres keep a paddle's radius inside of it.
+
+    Args:
+        kind: "robot" or "arcade".
+        table: the table.
+        side: which side of it.
+        others: sides that other seats own; a territory ends half-way to them.
+        team: the team that the seat plays for.
+    """
+    if kind not in SEAT_KINDS:
+        raise ValueError(f"seats: {kind!r} is unknown; there are {SEAT_KINDS}")
+    edge = -float(table.offsets[side])
+    ego = table.rotation(side).T
+    normals = table.normals @ ego
+    if kind == "robot":
+        near, far, wide, cut = edge + 0.0782, edge + 0.4982, 0.25, 0.08
+        slope = cut / 0.8
+        box = [
+            (near, wide),
+            (near, -wide),
+            (far - cut, -wide),
+            (far, -wide + slope),
+            (far, wide - slope),
+            (far - cut, wide),
+        ]
+        polygon, speed, acceleration = np.array(box), 0.7, 7.0
+    else:
+        polygon, speed, acceleration = np.asarray(table.vertices) @ ego, 2.5, 40.0
+    for normal, offset in zip(normals, table.offsets, strict=True):
+        polygon = clip(polygon, normal, offset - table.paddle_radius)
+    own = np.array([1.0, 0.0])
+    rivals = [other for other in others if other != side]
+    for other in rivals:
+        # Nearer to one's own side than to the other's, less the paddle's radius.
+        toward, gap = normals[other] - own, table.offsets[other] - table.offsets[side]
+        length = np.linalg.norm(toward)
+        polygon = clip(polygon, toward / length, gap / length - table.paddle_radius)
+    if not rivals and kind == "arcade":
+        polygon = clip(polygon, -own, -table.paddle_radius)
+    reach = tuple((float(x), float(y)) for x, y in polygon)
+    return Seat(side, reach, speed, acceleration, team)
+
+
+@cache
+def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
+    """Edges of the reaches of S seats in the table frame.
+
+    Returns:
+        Inward unit normals (S, K, 2), zero where a seat has fewer edges, and offsets
+        (S, K) in metres, infinite there.
+    """
+    planes = [half_planes(seat.reach) for seat in seats]
+    edges = max(len(offset) for _, offset in planes)
+    normals = np.zeros((len(seats), edges, 2))
+    offsets = np.full((len(seats), edges), np.inf)
+    for s, (seat, (normal, offset)) in enumerate(zip(seats, planes, strict=True)):
+        normals[s, : len(offset)] = normal @ table.rotation(seat.side)
+        offsets[s, : len(offset)] = offset
+    return normals, offsets
+
+
+@dataclass(frozen=True)
+class ReachPlanes:
+    """The reaches of S seats as half-planes of the table frame."""
+
+    normals: Array
+    """(S, K, 2) inward unit normals; zero where a seat has fewer edges"""
+    offsets: Array
+    """(S, K) m; infinite where a seat has fewer edges"""
+    share: Array
+    """(S,) of the acceleration that may be planned against one edge, so that braking
+    against both edges of a corner together stays within it"""
+    turn: Array
+    """(S, 2, 2) from the table frame to each seat's ego frame"""
+    passes: int
+    """Rounds of projection: more than one if any corner is sharper than 90 degrees"""
+
+    @staticmethod
+    def of(table: Table, seats: tuple[Seat, ...]) -> ReachPlanes:
+        """The reaches of the seats of a table."""
+        normals, offsets = reaches(table, seats)
+        share, sharpest = np.ones(len(seats)), 1.0
+        for s, seat in enumerate(seats):
+            normal, _ = half_planes(seat.reach)
+            cosine = np.einsum("kd,kd->k", normal, np.roll(normal, -1, axis=0)).min()
+            share[s] = np.sqrt((1 + cosine) / 2)
+            sharpest = min(sharpest, cosine)
+        turn = np.array([table.rotation(seat.side) for seat in seats])
+        passes = 1 if sharpest > -1e-9 else 12
+        return ReachPlanes(normals, offsets, share, turn, passes)

@@ -1,0 +1,114 @@
+"""The table: a convex polygon, its sides, and the seats with their ego frames.
+
+Table frame: origin at the centroid; for a rectangle x runs along the length from the
+home end (side 0) to the far end, y to the left. The ego frame of a side is the table
+frame rotated so that the side's inward normal is +x.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey.core.geometry import _cross
+from marl_airhockey.types import Array
+
+GRAVITY = 9.81
+"""m/s2"""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A convex playing surface; defaults are given by `TABLES`.
+
+    Raises:
+        ValueError: a polygon that is not convex and counter-clockwise about the
+            origin, or a disc that does not fit on it.
+    """
+
+    vertices: tuple[tuple[float, float], ...]
+    """Corners in metres, counter-clockwise; side k runs from corner k to k + 1."""
+    paddle_radius: float = 0.047625
+    """m (3.75 in diameter)"""
+    puck_radius: float = 0.03175
+    """m (2.5 in diameter)"""
+    physics: dict[str, float] = field(default_factory=dict, hash=False)
+    """Physical parameters that come with this table, by name."""
+
+    def __post_init__(self) -> None:
+        corners = np.asarray(self.vertices, dtype=float)
+        if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
+            raise ValueError("table.vertices: at least three (x, y) corners are needed")
+        ahead = np.roll(corners, -1, axis=0) - corners
+        turn = _cross(ahead, np.roll(ahead, -1, axis=0))
+        if (turn <= 0).any():
+            raise ValueError("table.vertices: must be convex and counter-clockwise")
+        if (self.offsets <= 0).any():
+            raise ValueError("table.vertices: the origin must lie inside the table")
+        for name in ("paddle_radius", "puck_radius"):
+            radius = getattr(self, name)
+            if not 0 < radius < self.offsets.min():
+                raise ValueError(
+                    f"table.{name}: {radius} m does not fit on this table; it must be "
+                    f"above 0 and below {self.offsets.min():.3f} m"
+                )
+
+    @staticmethod
+    def rectangle(length: float, width: float, **physics: float) -> Table:
+        """A table of ``length`` x ``width`` metres; side 0 is home, 2 the far end."""
+        x, y = length / 2, width / 2
+        return Table(((-x, y), (-x, -y), (x, -y), (x, y)), physics=physics)
+
+    @staticmethod
+    def regular(sides: int, inradius: float) -> Table:
+        """A regular polygon whose sides lie ``inradius`` metres from the centre."""
+        radius = inradius / np.cos(np.pi / sides)
+        angles = np.pi - np.pi / sides + 2 * np.pi * np.arange(sides) / sides
+        # Side 0 faces +x: it stands at x = -inradius, as home does on a rectangle.
+        corners = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
+        return Table(tuple((float(x), float(y)) for x, y in corners))
+
+    @cached_property
+    def normals(self) -> Array:
+        """(sides, 2) inward unit normals."""
+        corners = np.asarray(self.vertices, dtype=float)
+        ahead = np.roll(corners, -1, axis=0) - corners
+        ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+        return np.stack([-ahead[:, 1], ahead[:, 0]], -1)
+
+    @cached_property
+    def offsets(self) -> Array:
+        """(sides,) distance of each side from the origin, m."""
+        inward = (self.normals * np.asarray(self.vertices)).sum(-1)
+        return np.asarray(-inward)
+
+    @cached_property
+    def size(self) -> Array:
+        """(2,) extent of the bounding box, m."""
+        return np.asarray(np.ptp(np.asarray(self.vertices), axis=0))
+
+    def ends(self, side: int) -> tuple[Array, Array]:
+        """The two corners of a side, (2,) each."""
+        corners = np.asarray(self.vertices, dtype=float)
+        return corners[side], corners[(side + 1) % len(corners)]
+
+    def rotation(self, side: int) -> Array:
+        """(2, 2) matrix that turns a table-frame vector into the side's ego frame."""
+        c, s = self.normals[side]
+        return np.array([[c, s], [-s, c]])
+
+
+TABLES: dict[str, Table] = {
+    "standard": Table.rectangle(1.6764, 0.6096),
+    "full_size": Table.rectangle(1.9304, 0.8636),
+    "ut_sysid": Table.rectangle(
+        1.9304,
+        0.8636,
+        tilt=float(np.degrees(np.arcsin(0.687 / GRAVITY))),
+        puck_damping=0.346,
+    ),
+}
+"""Table presets: the 66 x 24 in workspace, the 76 x 34 in table, and that table with
+the tilt and damping that the paper's authors identified."""

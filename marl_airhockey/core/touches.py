@@ -1,0 +1,44 @@
+"""Touches: see the definitions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marl_airhockey.core.state import State
+from marl_airhockey.types import Array, Memory
+
+TOUCH_GAP = 0.15
+"""s: a touch is distinct if it begins this long after the last contact ended."""
+
+
+def no_touches(worlds: int, paddles: int, pucks: int) -> Memory:
+    """The memory of `count_touches` at the start of an episode."""
+    return {
+        "touches": np.zeros((worlds, paddles, pucks), np.int64),
+        "apart": np.full((worlds, paddles, pucks), np.inf),
+        "met": np.zeros(worlds, np.bool_),
+    }
+
+
+def count_touches(memory: Memory, before: State, after: State) -> Memory:
+    """Count distinct touches: ``touches`` and ``apart`` (..., paddles, pucks).
+
+    ``apart`` is the time in seconds since the last contact ended, 0 while in contact;
+    ``met`` (...) whether there was any touch yet. A puck cradled against the paddle
+    earns a single touch.
+    """
+    dt = (after.time - before.time)[..., None, None]
+    began = after.touched > 0
+    at = np.where(began, after.touched_at, 0.0)
+    distinct = began & (memory["apart"] + at >= TOUCH_GAP)
+    apart = np.where(began, dt - at, memory["apart"] + dt)
+    return {
+        "touches": memory["touches"] + distinct,
+        "apart": np.where(after.touching, 0.0, apart),
+        "met": memory["met"] | distinct.any((-1, -2)),
+    }
+
+
+def touched(memory: Memory) -> Array:
+    """(...) bool: any paddle has touched any puck in this episode."""
+    return memory["met"]

@@ -1,0 +1,1 @@
+"""The APIs: PettingZoo, Gymnasium, stable-baselines3."""

@@ -1,0 +1,111 @@
+"""The gymnasium.Env: one open seat, all others driven."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import gymnasium
+import numpy as np
+
+from marl_airhockey.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.world import World
+
+
+class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
+    """A scenario as its only open seat sees it.
+
+    Args:
+        scenario: its name, or a scenario object.
+        render_mode: None, "rgb_array" or "human".
+        camera: of its pictures: "top", or one of the backend's cameras.
+        **keywords: see `make.build_world`.
+
+    Raises:
+        ValueError: not exactly one seat is open.
+    """
+
+    metadata: dict[str, Any] = AirHockeyEnv.metadata
+
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        render_mode: str | None = None,
+        camera: str = "top",
+        **keywords: Unpack[Keywords],
+    ) -> None:
+        self.parallel = AirHockeyEnv(scenario, render_mode, camera, **keywords)
+        check_one_open(self.parallel.world)
+        self.agent = self.parallel.possible_agents[0]
+        self.render_mode = render_mode
+        self.metadata = self.parallel.metadata
+        self.observation_space = self.parallel.observation_space(self.agent)
+        self.action_space = self.parallel.action_space(self.agent)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Name of each element of the (flat part of the) observation."""
+        return self.parallel.observation_labels(self.agent)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode."""
+        super().reset(seed=seed)
+        observation, info = self.parallel.reset(seed, options)
+        return observation[self.agent], info[self.agent]
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Move by one control step; see `AirHockeyEnv` for the info."""
+        seen, reward, ended, cut, info = self.parallel.step({self.agent: action})
+        me = self.agent
+        # The name under which stable-baselines3 looks for it.
+        info[me]["is_success"] = info[me]["success"]
+        return seen[me], reward[me], ended[me], cut[me], info[me]
+
+    def render(self) -> Any:
+        """A picture (H, W, 3) uint8 for "rgb_array"."""
+        return self.parallel.render()
+
+    def close(self) -> None:
+        """Close the window and the physics."""
+        self.parallel.close()
+
+
+class AirHockeyGoalEnv(AirHockeySingleEnv):
+    """The same with goals="dict": a goal environment for hindsight relabelling."""
+
+    def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
+        """(...) float32: 1 where the goal is met; of goals (..., goal) alone."""
+        scenario = self.parallel.world.scenario
+        assert isinstance(scenario, GoalScenario)
+        return np.asarray(scenario.goal_reward(achieved, desired), np.float32)
+
+
+def check_one_open(world: World) -> None:
+    """Refuse a world that does not leave exactly one seat open.
+
+    Raises:
+        ValueError: says what to do.
+    """
+    if len(world.open) != 1:
+        agents = [f"paddle_{i}" for i in world.open]
+        raise ValueError(
+            f"{world.scenario.name!r} has open seats {agents}; a single-agent "
+            "environment needs exactly one: give the others drivers, e.g. "
+            'drivers={"paddle_1": "still"}'
+        )
+
+
+def make_single(
+    scenario: str | Scenario,
+    render_mode: str | None = None,
+    camera: str = "top",
+    **keywords: Unpack[Keywords],
+) -> AirHockeySingleEnv:
+    """What ``gymnasium.make`` calls."""
+    dicts = keywords.get("goals") == "dict"
+    kind = AirHockeyGoalEnv if dicts else AirHockeySingleEnv
+    return kind(scenario, render_mode, camera, **keywords)

@@ -1,0 +1,221 @@
+"""The PettingZoo ParallelEnv: one world, arrays turned into dicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Unpack
+
+import numpy as np
+from pettingzoo import ParallelEnv
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.limits import VIOLATIONS
+from marl_airhockey.envs.spaces import (
+    action_space,
+    global_state,
+    observation_space,
+    state_space,
+)
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.episode import StepResult
+
+Dicts = tuple[
+    dict[str, Any],
+    dict[str, float],
+    dict[str, bool],
+    dict[str, bool],
+    dict[str, dict[str, Any]],
+]
+
+
+CONSTRAINTS = tuple(enumerate(VIOLATIONS[:-1]))
+"""The limits, and where their excess stands; the last is the cost."""
+
+
+class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+    """One world of a scenario; the open seats are the agents, ``paddle_0`` and so on.
+
+    All agents stay to the end of the episode and end together. ``info`` of an agent
+    holds ``reward`` (terms by name), ``sent`` (what acted, as an action), ``success``
+    (latched), ``constraints`` and ``cost`` (by how much what was asked exceeded the
+    limits); that of a reset holds the ``physics`` of the episode.
+
+    Args:
+        scenario: its name, or a scenario object.
+        render_mode: None, "rgb_array" or "human".
+        camera: of its pictures: "top", or one of the backend's cameras.
+        **keywords: see `make.build_world`.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo declares it so
+        "name": "marl_airhockey",
+        "render_modes": ["human", "rgb_array"],
+        "is_parallelizable": True,
+        "render_fps": 20,
+    }
+
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        render_mode: str | None = None,
+        camera: str = "top",
+        **keywords: Unpack[Keywords],
+    ) -> None:
+        self.world = build_world(scenario, 1, autoreset=False, keywords=keywords)
+        fps = round(1 / self.world.control_dt)
+        game = self.world.scenario
+        name = f"{game.name}_v{game.version}"
+        self.metadata = {**type(self).metadata, "name": name, "render_fps": fps}
+        self.render_mode = render_mode
+        self._renderer = None
+        if render_mode is not None:
+            from marl_airhockey.render.renderer import Renderer
+
+            title = game.name.replace("_", " ")
+            self._renderer = Renderer(self.world, render_mode, title, camera=camera)
+        self.possible_agents = [f"paddle_{i}" for i in self.world.open]
+        self.agents: list[str] = []
+        observer = self.world.observer
+        self._observation_spaces = {
+            agent: observation_space(observer) for agent in self.possible_agents
+        }
+        self._action_spaces = {agent: action_space() for agent in self.possible_agents}
+        self.observation_spaces = self._observation_spaces
+        self.action_spaces = self._action_spaces
+        self.state_space = state_space(self.world)
+        self.np_random = np.random.default_rng()
+
+    @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return self.world.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self.world.max_cycles = cycles
+
+    @property
+    def teams(self) -> dict[int, list[str]]:
+        """Agents (driven ones too) by team."""
+        teams: dict[int, list[str]] = {}
+        for i, seat in enumerate(self.world.scene.seats):
+            teams.setdefault(seat.team, []).append(f"paddle_{i}")
+        return teams
+
+    @property
+    def group_map(self) -> dict[str, list[str]]:
+        """Open agents by team, as TorchRL's ``group_map`` and RLlib's policies ask."""
+        names = {f"team_{team}": agents for team, agents in self.teams.items()}
+        mine = {
+            k: [a for a in v if a in self.possible_agents] for k, v in names.items()
+        }
+        return {name: agents for name, agents in mine.items() if agents}
+
+    def observation_space(self, agent: str) -> Any:
+        """The same object at every call."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        """The same object at every call."""
+        return self._action_spaces[agent]
+
+    def observation_labels(self, agent: str) -> tuple[str, ...]:
+        """Name of each element of the (flat part of the) observation."""
+        self._observation_spaces[agent]
+        return self.world.observer.layout.labels
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Begin an episode; the same seed gives the same episodes."""
+        if seed is not None:
+            self.np_random = np.random.default_rng(seed)
+        observation = self.world.reset(seed)
+        self.agents = self.possible_agents[:]
+        physics = {k: float(v[0]) for k, v in self.world.episode.physics.items()}
+        if self._renderer is not None:
+            self._renderer.begin()
+        self._watch()
+        return self._dict(observation), {a: {"physics": physics} for a in self.agents}
+
+    def step(self, actions: Mapping[str, Any]) -> Dicts:
+        """Move by one control step.
+
+        Raises:
+            RuntimeError: before a reset, or after the end of the episode.
+            ValueError: a missing or extra agent, or a bad action, named.
+        """
+        if not self.agents:
+            if not actions and self.world.episode.number[0]:
+                return {}, {}, {}, {}, {}
+            raise RuntimeError("step: call reset() first; no episode is running")
+        result = self.world.step(self._array(actions))
+        agents, reward = self.agents, result.reward
+        terminated, truncated = result.terminated.item(0), result.truncated.item(0)
+        outcome = (
+            self._dict(result.observation),
+            {agent: reward.item(i) for i, agent in enumerate(agents)},
+            dict.fromkeys(agents, terminated),
+            dict.fromkeys(agents, truncated),
+            {agent: self._info(result, i) for i, agent in enumerate(agents)},
+        )
+        if terminated or truncated:
+            self.agents = []
+        self._watch()
+        return outcome
+
+    def _watch(self) -> None:
+        """Keep the trails, and in human mode the window, up to date."""
+        if self._renderer is not None:
+            self._renderer.follow()
+
+    def _array(self, actions: Mapping[str, Any]) -> Array:
+        """(1, open, 2) from a dict with an action for each agent and no other."""
+        agents = self.agents
+        if actions.keys() != self._action_spaces.keys():
+            missing = sorted(set(agents) - set(actions))
+            extra = sorted(set(actions) - set(agents))
+            raise ValueError(f"actions: missing agents {missing}, extra {extra}")
+        array = np.empty((1, len(agents), 2))
+        for i, agent in enumerate(agents):
+            action = np.asarray(actions[agent])
+            if action.shape != (2,) or action.dtype.kind not in "fiu":
+                raise ValueError(
+                    f"actions[{agent!r}]: expected 2 numbers, got shape {action.shape} "
+                    f"of dtype {action.dtype}"
+                )
+            array[0, i] = action
+        return array
+
+    def _dict(self, observation: Any) -> dict[str, Any]:
+        agents = enumerate(self.possible_agents)
+        if isinstance(observation, dict):
+            return {a: {k: v[0, i] for k, v in observation.items()} for i, a in agents}
+        return {a: observation[0, i] for i, a in agents}
+
+    def _info(self, result: StepResult, i: int) -> dict[str, Any]:
+        violation = result.violation[0, self.world.open[i]].tolist()
+        return {
+            "reward": {k: v.item(i) for k, v in result.terms.items()},
+            "sent": result.sent[0, i],
+            "success": result.success.item(i),
+            "constraints": {name: violation[k] for k, name in CONSTRAINTS},
+            "cost": violation[-1],
+        }
+
+    def state(self) -> Array:
+        """The true state of everything, table frame, for centralised critics."""
+        return np.asarray(global_state(self.world)[0])
+
+    def render(self) -> Array | None:
+        """A picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""
+        if self._renderer is None:
+            raise RuntimeError('render: build it with render_mode="rgb_array"')
+        return self._renderer.show()
+
+    def close(self) -> None:
+        """Close the window and the physics."""
+        if self._renderer is not None:
+            self._renderer.close()
+        self.world.close()

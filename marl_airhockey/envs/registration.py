@@ -1,0 +1,22 @@
+"""Tell gymnasium of every scenario, when this package is imported.
+
+Gymnasium has had no entry points for plugins since 1.0: an id is known after ``import
+marl_airhockey``, or with the module named before it,
+``marl_airhockey:marl_airhockey/Juggle-v0``.
+"""
+
+from __future__ import annotations
+
+from gymnasium.envs.registration import register
+
+from marl_airhockey.registry import gymnasium_id, scenario_names
+
+
+def register_all() -> None:
+    """Register ``marl_airhockey/CamelCase-v0`` for every file in ``scenarios/``."""
+    for name in scenario_names():
+        register(
+            id=gymnasium_id(name),
+            entry_point="marl_airhockey.envs.gymnasium_env:make_single",
+            kwargs={"scenario": name},
+        )

@@ -1,0 +1,147 @@
+"""The stable-baselines3 VecEnv over B worlds: one slot for each open seat of each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any, Unpack
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
+from marl_airhockey.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.envs.spaces import action_space, observation_space
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.episode import StepResult
+from marl_airhockey.world.observer import Observation
+
+
+class AirHockeyVecEnv(VecEnv):
+    """B x open seats as SB3 slots, world by world; episodes restart at once.
+
+    Done slots get ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``,
+    ``first_shot`` and ``episode``; all others share one empty dict.
+
+    Args:
+        scenario: its name, or a scenario object.
+        num_worlds: B.
+        **keywords: see `make.build_world`.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        num_worlds: int = 1,
+        **keywords: Unpack[Keywords],
+    ) -> None:
+        self.world = build_world(scenario, num_worlds, True, keywords)
+        self.seats = len(self.world.open)
+        self.render_mode = None
+        self.last_terms: dict[str, float] = {}
+        """Mean reward terms of the last step, by name."""
+        self._began = time.time()
+        self._nothing: dict[str, Any] = {}
+        slots = num_worlds * self.seats
+        self._returns, self._lengths = np.zeros(slots), np.zeros(slots, np.int64)
+        self._actions = np.zeros((num_worlds, self.seats, 2))
+        super().__init__(slots, observation_space(self.world.observer), action_space())
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """World i gets seed + i at the next reset."""
+        if seed is not None:
+            self.world.seed(seed)
+        return [seed] * self.num_envs
+
+    def reset(self) -> Any:
+        """Begin an episode in every world."""
+        self._returns[:], self._lengths[:] = 0.0, 0
+        return self._slots(self.world.reset())
+
+    def step_async(self, actions: Array) -> None:
+        """Take the actions (slots, 2)."""
+        self._actions = np.asarray(actions).reshape(-1, self.seats, 2)
+
+    def step_wait(self) -> Any:
+        """Move all worlds by one control step."""
+        result = self.world.step(self._actions)
+        reward = self._pick(result.reward).astype(np.float32)
+        self.last_terms = {k: float(v.mean()) for k, v in result.terms.items()}
+        self._returns += reward
+        self._lengths += 1
+        ended = result.terminated | result.truncated
+        success, done = self._pick(result.success), self._done(ended)
+        infos = [self._nothing] * self.num_envs
+        if result.final_observation is not None:
+            final = self._slots(result.final_observation)
+            for i in np.flatnonzero(done).tolist():
+                world = self._world(i)
+                infos[i] = {
+                    "terminal_observation": _row(final, i),
+                    "TimeLimit.truncated": bool(result.truncated[world]),
+                    "is_success": bool(success[i]),
+                    "first_shot": bool(result.first_shot[world]),
+                    "episode": {
+                        "r": float(self._returns[i]),
+                        "l": int(self._lengths[i]),
+                        "t": time.time() - self._began,
+                    },
+                }
+            self._returns[done], self._lengths[done] = 0.0, 0
+            self._restarted(np.flatnonzero(ended), result)
+        return self._slots(result.observation), reward, done, infos
+
+    def _slots(self, observation: Observation) -> Any:
+        if isinstance(observation, np.ndarray):
+            return self._pick(observation)
+        return {k: self._pick(v) for k, v in observation.items()}
+
+    def _pick(self, rows: Array) -> Array:
+        """(slots, ...) of (B, seats, ...)."""
+        return rows.reshape(self.num_envs, *rows.shape[2:])
+
+    def _done(self, ended: Array) -> Array:
+        """(slots,) of (B,)."""
+        return np.repeat(ended, self.seats)
+
+    def _world(self, slot: int) -> int:
+        return slot // self.seats
+
+    def _restarted(self, worlds: Array, last: StepResult) -> None:
+        """Some worlds, by index, have begun anew after their last step."""
+        return None
+
+    def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
+        """(...) float32: 1 where the goal is met; for goals="dict"."""
+        scenario = self.world.scenario
+        assert isinstance(scenario, GoalScenario)
+        return np.asarray(scenario.goal_reward(achieved, desired), np.float32)
+
+    def close(self) -> None:
+        """Close the physics."""
+        self.world.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of the environment, once for each slot."""
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of the environment."""
+        setattr(self, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
+    ) -> list[Any]:
+        """Call a method once for each slot asked for."""
+        method = getattr(self, method_name)
+        return [method(*args, **kwargs) for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """No slot is wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+
+def _row(observations: Any, i: int) -> Any:
+    if isinstance(observations, dict):
+        return {name: value[i] for name, value in observations.items()}
+    return observations[i]

@@ -1,0 +1,1 @@
+"""Play and measure: episodes, games, leagues, speed."""

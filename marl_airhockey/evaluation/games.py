@@ -1,0 +1,116 @@
+"""Games between players: who wins, by how much, over many games in one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, build_world, find_scenario
+from marl_airhockey.world.roster import Roster
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """How G games of T teams went."""
+
+    won: Array
+    """(G, T) bool; nobody in a draw"""
+    margin: Array
+    """(G, T) return of a team's seats: goals for less goals against"""
+    seconds: Array
+    """(G,) how long it took"""
+
+    @property
+    def score(self) -> Array:
+        """(G, T) 1 for a win, an equal share of 1 for a draw."""
+        drawn = ~self.won.any(-1, keepdims=True)
+        return np.asarray(self.won + drawn / self.won.shape[1])
+
+
+def teams_of(seats: Sequence[int]) -> Array:
+    """(seats,) the number of each seat's team, from 0."""
+    return np.unique(np.asarray(seats), return_inverse=True)[1]
+
+
+def challenge(
+    scenario: str,
+    player: Driver,
+    rivals: Sequence[Driver],
+    games: int,
+    seed: int,
+    keywords: Keywords | None = None,
+) -> tuple[Array, Array]:
+    """One player against each of others, who play for all other teams.
+
+    Args:
+        scenario: a game.
+        player: it changes ends from game to game.
+        rivals: drivers.
+        games: against each.
+        seed: of the first game.
+        keywords: of the environment.
+
+    Returns:
+        Its score and its mean margin against each rival, (R,).
+    """
+    keywords = keywords or {}
+    scene = find_scenario(scenario, keywords).scene
+    teams = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
+    rows = np.arange(1, len(rivals) + 1).repeat(games)
+    lineups = rows[:, None].repeat(teams, axis=1)
+    lineups[np.arange(len(rows)), np.arange(len(rows)) % teams] = 0
+    found = play(scenario, [player, *rivals], lineups, seed, keywords)
+    score, margin = found.score[lineups == 0], found.margin[lineups == 0]
+    return score.reshape(-1, games).mean(-1), margin.reshape(-1, games).mean(-1)
+
+
+def play(
+    scenario: str,
+    players: Sequence[Driver],
+    lineups: Array,
+    seed: int,
+    keywords: Keywords | None = None,
+) -> Outcomes:
+    """Play games, all at once, to their ends.
+
+    Args:
+        scenario: a game.
+        players: drivers.
+        lineups: (G, T) which player plays for which team in each game, by number.
+        seed: of the first game; game i has seed + i.
+        keywords: of the environment, see `make.build_world`.
+
+    Raises:
+        ValueError: a scenario without teams that play each other.
+    """
+    games = len(lineups)
+    world = build_world(scenario, games, autoreset=False, keywords=keywords or {})
+    teams = teams_of([seat.team for seat in world.scene.seats])
+    if teams.max() == 0:
+        raise ValueError(f"{scenario!r} has no teams that play against each other")
+    if lineups.shape != (games, teams.max() + 1):
+        raise ValueError(f"{scenario!r} is played by {teams.max() + 1} teams")
+    roster = Roster(world)
+    for number, player in enumerate(players):
+        roster.add(f"player {number}", player)
+    roster.seated[:] = np.asarray(lineups)[:, teams]
+    world.reset(seed)
+    roster.begin(np.arange(games))
+    first = [int(np.flatnonzero(teams == team)[0]) for team in range(teams.max() + 1)]
+    won, margin = np.zeros(lineups.shape, np.bool_), np.zeros(lineups.shape)
+    seconds, playing = np.zeros(games), np.ones(games, np.bool_)
+    actions = np.zeros((games, len(teams), 2))
+    while playing.any():
+        roster.ask(actions)
+        step = world.step(actions)
+        ended = playing & (step.terminated | step.truncated)
+        won[ended] = world.episode.success[ended][:, first]
+        margin[ended] = world.episode.returns[ended][:, first]
+        seconds[ended] = world.state.time[ended]
+        playing &= ~ended
+    world.close()
+    return Outcomes(won, margin, seconds)

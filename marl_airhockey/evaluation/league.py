@@ -1,0 +1,110 @@
+"""A round-robin of players of a game: ratings, a matrix, and who beats whom in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.evaluation.games import Outcomes, play
+from marl_airhockey.evaluation.standings import Standings
+from marl_airhockey.evaluation.stats import elo
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords
+
+LEAGUE_SEED = 3_000_000
+
+
+BATCH = 4096
+"""Most games at once."""
+
+
+def league(
+    scenario: str,
+    players: Mapping[str, Driver],
+    games: int = 100,
+    seed: int = LEAGUE_SEED,
+    keywords: Keywords | None = None,
+) -> Standings:
+    """Let everybody play everybody.
+
+    Args:
+        scenario: a game of two teams.
+        players: by name, two at least.
+        games: of each pair; they change ends at half of them.
+        seed: of the first game.
+        keywords: of the environment.
+
+    Raises:
+        ValueError: a single player, or a scenario that is no game of two teams.
+    """
+    names, count = tuple(players), len(players)
+    if count < 2:
+        raise ValueError("a league needs at least two players")
+    pairs = np.array(list(combinations(range(count), 2)))
+    lineups = pairs.repeat(games, axis=0)
+    swapped = np.arange(len(lineups)) % games >= games // 2
+    lineups[swapped] = lineups[swapped, ::-1]
+    parts = [
+        play(scenario, list(players.values()), some, seed + first, keywords)
+        for first in range(0, len(lineups), BATCH)
+        for some in [lineups[first : first + BATCH]]
+    ]
+    found = Outcomes(
+        *[np.concatenate(x) for x in zip(*map(_fields, parts), strict=True)]
+    )
+    # Columns as in `pairs`, whatever the ends.
+    won, margin = found.won, found.margin
+    won[swapped], margin[swapped] = won[swapped, ::-1], margin[swapped, ::-1]
+    won = won.reshape(len(pairs), games, 2)
+    wins, draws, goals = np.zeros((3, count, count))
+    a, b = pairs.T
+    wins[a, b], wins[b, a] = won.sum(1).T
+    draws[a, b] = draws[b, a] = (~won.any(-1)).sum(1)
+    goals[a, b], goals[b, a] = margin.reshape(len(pairs), games, 2).mean(1).T
+    ratings = elo(wins + 0.5 * draws, wins + wins.T + draws)
+    spread = _rating_intervals(won, pairs, count, seed)
+    return Standings(scenario, names, games, wins, draws, goals, ratings, spread)
+
+
+def found_in(folder: Path) -> list[str]:
+    """Paths of the policies in a folder: runs of `train`, frozen and ONNX files.
+
+    Raises:
+        ValueError: a folder without any.
+    """
+    runs = [path.parent for path in sorted(folder.rglob("config.toml"))]
+    inside = {run for run in runs if (run / "last.zip").exists()}
+    files = [
+        path
+        for kind in ("npz", "onnx")
+        for path in sorted(folder.rglob(f"*.{kind}"))
+        if not inside & set(path.parents)
+    ]
+    found = [str(path) for path in (*sorted(inside), *files)]
+    if not found:
+        raise ValueError(f"{folder}: no policies and no runs in it")
+    return found
+
+
+def _fields(found: Outcomes) -> tuple[Array, Array, Array]:
+    return found.won, found.margin, found.seconds
+
+
+def _rating_intervals(won: Array, pairs: Array, count: int, seed: int) -> Array:
+    """(E, 2) 95 % intervals of ratings, games of each pair being drawn again."""
+    rng, games, found = np.random.default_rng(seed), won.shape[1], []
+    points = won + 0.5 * ~won.any(-1, keepdims=True)
+    a, b = pairs.T
+    played = np.zeros((count, count))
+    played[a, b] = played[b, a] = games
+    for _ in range(200):
+        drawn = rng.integers(0, games, (len(pairs), games))
+        sums = np.take_along_axis(points, drawn[..., None], axis=1).sum(1)
+        score = np.zeros((count, count))
+        score[a, b], score[b, a] = sums.T
+        found.append(elo(score, played))
+    return np.quantile(found, [0.025, 0.975], axis=0).T

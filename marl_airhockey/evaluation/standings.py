@@ -1,0 +1,155 @@
+"""Standings: see the definitions."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from itertools import combinations, permutations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.types import Array
+
+
+@dataclass(frozen=True)
+class Standings:
+    """Results of E players, each against each."""
+
+    scenario: str
+    names: tuple[str, ...]
+    games: int
+    """Of each pair, half of them at either end."""
+    wins: Array
+    """(E, E) games that the row's player won against the column's"""
+    draws: Array
+    """(E, E)"""
+    margin: Array
+    """(E, E) mean goals for less goals against"""
+    ratings: Array
+    """(E,) Elo, 1000 on average"""
+    rating_intervals: Array
+    """(E, 2) 95 %, by resampling games"""
+
+    @property
+    def score(self) -> Array:
+        """(E, E) share of points, a draw being half a win; nan against oneself."""
+        with np.errstate(invalid="ignore"):
+            share = (self.wins + 0.5 * self.draws) / self.played
+        return np.asarray(share)
+
+    @property
+    def played(self) -> Array:
+        """(E, E) games."""
+        return np.asarray(self.wins + self.wins.T + self.draws)
+
+    @property
+    def order(self) -> list[int]:
+        """Players, the best first."""
+        return [int(i) for i in np.argsort(-self.ratings, kind="stable")]
+
+    @property
+    def circles(self) -> list[tuple[str, str, str]]:
+        """Triples in which each certainly (95 %) beats the next, the last the first."""
+        beats = np.zeros(self.score.shape, np.bool_)
+        for a, b in permutations(range(len(self.names)), 2):
+            low, _ = interval(float(self.score[a, b]), int(self.played[a, b]))
+            beats[a, b] = low > 0.5
+        found = []
+        for a, b, c in combinations(range(len(self.names)), 3):
+            for x, y, z in ((a, b, c), (a, c, b)):
+                if beats[x, y] and beats[y, z] and beats[z, x]:
+                    found.append((self.names[x], self.names[y], self.names[z]))
+        return found
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The table, the best first."""
+        wins, draws = self.wins.sum(-1), self.draws.sum(-1)
+        losses, others = self.wins.sum(0), len(self.names) - 1
+        low, high = self.rating_intervals.T
+        return [
+            {
+                "player": self.names[i],
+                "elo": float(self.ratings[i]),
+                "elo_low": float(low[i]),
+                "elo_high": float(high[i]),
+                "score": float(np.nanmean(self.score[i])),
+                "wins": int(wins[i]),
+                "draws": int(draws[i]),
+                "losses": int(losses[i]),
+                "goal_difference": float(self.margin[i].sum() / others),
+            }
+            for i in self.order
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """For a report."""
+        order = self.order
+        return {
+            "scenario": self.scenario,
+            "games_of_a_pair": self.games,
+            "table": self.rows(),
+            "players": [self.names[i] for i in order],
+            "score": self.score[np.ix_(order, order)].tolist(),
+            "goal_difference": self.margin[np.ix_(order, order)].tolist(),
+            "circles": self.circles,
+        }
+
+    def to_markdown(self) -> str:
+        """The table and the circles."""
+        lines = [
+            f"# League of {self.scenario}: {self.games} games of each pair",
+            "",
+            "| player | Elo (95 %) | score | won | drawn | lost | goals a game |",
+            "| --- | --- | --- | --- | --- | --- | --- |",
+        ]
+        for r in self.rows():
+            lines.append(
+                f"| {r['player']} | {r['elo']:.0f} ({r['elo_low']:.0f}.."
+                f"{r['elo_high']:.0f}) | {r['score']:.3f} | {r['wins']} | {r['rng']}"
+                f" | {r['losses']} | {r['goal_difference']:+.2f} |"
+            )
+        lines += ["", *(f"Circle: {' > '.join((*c, c[0]))}" for c in self.circles)]
+        return "\n".join(lines).rstrip() + "\n"
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write ``league.json``, ``league.md`` and ``league.png``."""
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [folder / f"league.{kind}" for kind in ("json", "md", "png")]
+        files[0].write_text(json.dumps(self.to_json(), indent=1))
+        files[1].write_text(self.to_markdown())
+        picture(self, files[2])
+        return files
+
+
+def picture(standings: Standings, path: Path) -> None:
+    """The matrix of scores, the best player first."""
+    import matplotlib.pyplot as plt
+
+    from marl_airhockey.evaluation.charts import DPI, save
+
+    order, count = standings.order, len(standings.names)
+    score = standings.score[np.ix_(order, order)]
+    names = [standings.names[i] for i in order]
+    size = 2.6 + 0.62 * count
+    figure, axes = plt.subplots(
+        figsize=(size + 1.2, size), dpi=DPI, layout="constrained"
+    )
+    image = axes.imshow(score, cmap="RdBu", vmin=0.0, vmax=1.0)
+    for row in range(count):
+        for column in range(count):
+            if row != column:
+                value = score[row, column]
+                ink = "white" if abs(value - 0.5) > 0.32 else "black"
+                text = f"{value:.2f}"
+                axes.text(
+                    column, row, text, ha="center", va="center", color=ink, size=8
+                )
+    axes.set_xticks(range(count), names, rotation=45, ha="right")
+    axes.set_yticks(range(count), names)
+    axes.set_title(f"{standings.scenario}: score of the row against the column")
+    axes.spines[:].set_visible(False)
+    figure.colorbar(image, ax=axes, shrink=0.7, label="win + draw / 2")
+    save(figure, path)

@@ -1,0 +1,90 @@
+"""Statistics of runs and games: what to report instead of a bare mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from marl_airhockey.types import Array
+
+RESAMPLES = 2000
+"""Of a bootstrap."""
+
+
+def interval(share: float, n: int) -> tuple[float, float]:
+    """95 % interval of a share of n trials (Wilson, 1927)."""
+    z = 1.96
+    middle = (share + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * np.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
+    return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+
+
+def iqm(values: Array) -> float:
+    """Interquartile mean: that of the middle half, (Agarwal et al., 2021).
+
+    Values at the edges of the middle half count by the part that lies in it, so that it
+    is right for any number of values.
+    """
+    ordered = np.sort(np.ravel(values)).astype(float)
+    n = len(ordered)
+    if not n:
+        raise ValueError("iqm: no values")
+    edges = np.arange(n + 1) / n
+    inside = np.clip(edges[1:], 0.25, 0.75) - np.clip(edges[:-1], 0.25, 0.75)
+    return float((inside * ordered).sum() / inside.sum())
+
+
+def bootstrap(
+    values: Array,
+    statistic: Callable[[Array], float] = iqm,
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+) -> tuple[float, float]:
+    """95 % percentile interval of a statistic.
+
+    Args:
+        values: (runs, ...); runs are drawn with replacement, rows staying together.
+        statistic: of such an array.
+        seed: of the drawing.
+        resamples: how many.
+    """
+    rows, rng = np.asarray(values), np.random.default_rng(seed)
+    found = [
+        statistic(rows[rng.integers(0, len(rows), len(rows))]) for _ in range(resamples)
+    ]
+    low, high = np.quantile(found, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def probability_of_improvement(new: Array, old: Array) -> float:
+    """How likely a run of the one beats a run of the other; a tie counts half.
+
+    Args:
+        new: (n,) results of runs.
+        old: (m,) results of runs.
+    """
+    gap = np.sign(np.subtract.outer(np.ravel(new), np.ravel(old)))
+    return float(0.5 + 0.5 * gap.mean())
+
+
+def elo(score: Array, games: Array) -> Array:
+    """(E,) ratings of E players, 1000 on average, by the model of Bradley and Terry.
+
+    Every player has one more game, drawn with an average one, so that ratings of those
+    who never won or lost stay finite.
+
+    Args:
+        score: (E, E) points of the row's player against the column's.
+        games: (E, E) games between them.
+    """
+    share = np.ones(len(score))
+    won = score.sum(-1) + 0.5
+    for _ in range(2000):
+        meet = games / np.add.outer(share, share)
+        new = won / (meet.sum(-1) + 1.0 / (share + 1.0))
+        new /= np.exp(np.log(new).mean())
+        if np.abs(np.log(new / share)).max() < 1e-9:
+            break
+        share = new
+    return np.asarray(1000.0 + 400.0 * np.log10(share))

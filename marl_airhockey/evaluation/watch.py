@@ -1,0 +1,79 @@
+"""Watch a driver: in a window, or as a video file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.evaluation.evaluate import seat_world
+from marl_airhockey.render.renderer import TOP, Renderer
+from marl_airhockey.render.video import write_video
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords
+
+FINAL_HOLD = 0.7
+"""s: how long a video rests on the last picture of an episode."""
+
+
+def film(
+    scenario: str | Scenario,
+    driver: Driver,
+    keywords: Keywords,
+    seed: int = 0,
+    episodes: int = 1,
+    video: Path | None = None,
+    width: int = 640,
+    seconds: float = float("inf"),
+    camera: str = TOP,
+) -> list[Array]:
+    """Play some episodes with ``driver`` at paddle_0 and show them.
+
+    Args:
+        scenario: its name, or a scenario object.
+        driver: who plays.
+        keywords: of the environment.
+        seed: of the first episode.
+        episodes: how many.
+        video: a .gif or .mp4 to write; None opens a window.
+        width: of the pictures, pixels.
+        seconds: at most this much of each episode.
+        camera: the view: "top", or one of the backend's cameras.
+
+    Returns:
+        The pictures (H, W, 3) uint8; none if they went to a window.
+
+    Raises:
+        RuntimeError: there is no screen for a window.
+    """
+    if video is None and not any(
+        os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    ):
+        raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
+    if video is not None and video.suffix not in (".gif", ".mp4"):
+        raise ValueError(f"video: {video.name!r} must end in .gif or .mp4")
+    world = seat_world(driver, scenario, 1, keywords)
+    mode = "human" if video is None else "rgb_array"
+    title = world.scenario.name.replace("_", " ")
+    renderer = Renderer(world, mode, title, camera=camera)
+    fps = 1 / world.control_dt
+    pictures: list[Array] = []
+    for episode in range(episodes):
+        world.reset(seed if episode == 0 else None)
+        renderer.begin()
+        over = False
+        while not over and float(world.state.time[0]) < seconds:
+            step = world.step(np.zeros((1, 0, 2)))
+            over = bool(step.terminated[0] or step.truncated[0])
+            renderer.follow()
+            if video is not None:
+                pictures.append(renderer.picture(width))
+        pictures += pictures[-1:] * round(FINAL_HOLD * fps)
+    if video is not None:
+        write_video(video, pictures, fps)
+    renderer.close()
+    world.close()
+    return pictures

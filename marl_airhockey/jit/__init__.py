@@ -1,0 +1,1 @@
+"""Numpy functions traced once and compiled over worlds; threads."""

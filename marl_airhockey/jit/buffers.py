@@ -1,0 +1,38 @@
+"""Fresh arrays for the results of a call, made many calls' worth at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.types import Array
+
+ROWS = 64
+"""Rows of every array that are made at once: numpy hands out rows of an array faster
+than new arrays."""
+
+
+class BufferPool:
+    """Hands out arrays that nobody else has, of any content.
+
+    Args:
+        kinds: shape and type of a row of each array.
+    """
+
+    def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]]) -> None:
+        self._kinds = list(kinds)
+        self._waiting: dict[int, list[tuple[Array, ...]]] = {}
+
+    def take(self, rows: int) -> tuple[Array, ...]:
+        """One array of each kind, with so many rows."""
+        waiting = self._waiting.get(rows)
+        if waiting:
+            return waiting.pop()
+        if rows >= ROWS or not self._kinds:
+            return tuple(np.empty((rows, *shape), kind) for shape, kind in self._kinds)
+        calls = ROWS // max(rows, 1)
+        blocks = [np.empty((calls, rows, *s), kind) for s, kind in self._kinds]
+        self._waiting[rows] = waiting = list(zip(*blocks, strict=True))
+        return waiting.pop()

@@ -1,0 +1,207 @@
+"""Writes what a tape recorded as a loop over worlds, and has numba compile it.
+
+The sources lie in the user's cache folder, with numba's compiled code beside them, so
+that a loop is compiled once per machine.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.jit.tracer import Symbol, Tape
+from marl_airhockey.types import Array
+
+Call = Callable[..., tuple[dict[str, Array], ...]]
+"""Calls a loop: takes it, its output arrays, and the mappings of inputs."""
+Name = tuple[int, str]
+"""Of an input: which source, and its key there."""
+
+INFIX = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "divide": "/",
+    "less": "<",
+    "less_equal": "<=",
+    "greater": ">",
+    "greater_equal": ">=",
+    "equal": "==",
+    "not_equal": "!=",
+    "bitwise_and": "&",
+    "bitwise_or": "|",
+}
+"""Operations that numba compiles faster as operators."""
+_loaded: dict[str, Loaded] = {}
+
+
+class Writer:
+    """Turns a tape into a module: the loop, and how to call it with mappings.
+
+    Args:
+        tape: what was recorded.
+        kinds: dtype of each input.
+    """
+
+    def __init__(self, tape: Tape, kinds: Mapping[Name, Any]) -> None:
+        self._tape, self._kinds = tape, kinds
+        self._stores: list[tuple[str, Any]] = []
+        self._outputs: list[str] = []
+        """Their types"""
+        self._sinks: list[list[str]] = []
+        self._live: set[Symbol] = set()
+        self.inputs: dict[Name, str] = {}
+        """Those that are used: name -> variable"""
+        self._axes: dict[Name, int] = {}
+
+    def begin_sink(self) -> None:
+        """What follows goes into the next mapping."""
+        self._sinks.append([])
+
+    def store(self, key: str, place: Array, dtype: Any) -> None:
+        """Write an array of one world, (*) scalars, to a fresh output."""
+        variable = f"o{len(self._outputs)}"
+        self._outputs.append(_type(dtype, 1 + place.ndim))
+        self._sinks[-1].append(f"{key!r}: {variable}")
+        for index in np.ndindex(place.shape):
+            self._stores.append((_element(variable, index), place[index]))
+            self._mark(place[index])
+
+    def _mark(self, scalar: Any) -> None:
+        """Note what is needed for a scalar."""
+        waiting = [scalar]
+        while waiting:
+            symbol = waiting.pop()
+            if not isinstance(symbol, Symbol) or symbol in self._live:
+                continue
+            self._live.add(symbol)
+            if symbol.op == "input":
+                name, index = symbol.args
+                self.inputs.setdefault(name, f"i{len(self.inputs)}")
+                self._axes[name] = 1 + len(index)
+            else:
+                waiting += symbol.args
+
+    def source(self, sources: int) -> str:
+        """The module, for a number of sources."""
+        live = [s for s in self._tape.symbols.values() if s in self._live]
+        names = {symbol: f"t{i}" for i, symbol in enumerate(live)}
+        body = [f"{names[s]} = {self._expression(s, names)}" for s in live]
+        body += [f"{place} = {_named(s, names)}" for place, s in self._stores]
+        types = [_type(self._kinds[n], self._axes[n]) for n in self.inputs]
+        outputs = [f"o{i}" for i in range(len(self._outputs))]
+        given = [_lookup(name) for name in self.inputs]
+        variables = [*self.inputs.values(), *outputs]
+        sinks = ", ".join("{" + ", ".join(sink) + "}" for sink in self._sinks)
+        lines = [
+            '"""Written by marl_airhockey.jit.codegen; may be deleted at any time."""',
+            "import numpy as np",
+            "from numpy import inf, nan",
+            f"SIGNATURE = 'void({', '.join([*types, *self._outputs])})'",
+            f"def kernel({', '.join(variables)}):",
+            f"    for b in range({variables[0]}.shape[0]):",
+            *(f"        {line}" for line in body),
+            f"def call(kernel, outputs, {', '.join(f's{i}' for i in range(sources))}):",
+            f"    ({', '.join(outputs)},) = outputs",
+            f"    kernel({', '.join([*given, *outputs])})",
+            f"    return ({sinks},)",
+        ]
+        return "\n".join(lines) + "\n"
+
+    def _expression(self, symbol: Symbol, names: dict[Symbol, str]) -> str:
+        """A symbol as an expression of numba."""
+        op = symbol.op
+        if op == "input":
+            name, index = symbol.args
+            return _element(self.inputs[name], index)
+        args = [_named(a, names) for a in symbol.args]
+        if op == "where":
+            return f"{args[1]} if {args[0]} else {args[2]}"
+        truths = all(_is_truth(a) for a in symbol.args)
+        if op == "invert" and truths:
+            return f"not {args[0]}"
+        if op in INFIX and not (truths and op in ("add", "multiply")):
+            return f" {INFIX[op]} ".join(args)
+        return f"np.{op}({', '.join(args)})"
+
+
+def _lookup(name: Name) -> str:
+    return f"s{name[0]}[{name[1]!r}]"
+
+
+def _element(variable: str, index: tuple[int, ...]) -> str:
+    return f"{variable}[{', '.join(map(str, ('b', *index)))}]"
+
+
+def _named(scalar: Any, names: dict[Symbol, str]) -> str:
+    return names[scalar] if isinstance(scalar, Symbol) else repr(scalar)
+
+
+def _is_truth(scalar: Any) -> bool:
+    value = scalar.value if isinstance(scalar, Symbol) else scalar
+    return isinstance(value, (bool, np.bool_))
+
+
+def _type(dtype: Any, axes: int) -> str:
+    """The type of an array as numba writes it, rows one behind the other."""
+    name = "boolean" if dtype == np.bool_ else np.dtype(dtype).name
+    return f"{name}[{':, ' * (axes - 1)}::1]"
+
+
+class Loaded(NamedTuple):
+    """A written module."""
+
+    kernel: Callable[..., Any]
+    """Compiled"""
+    module: ModuleType
+
+
+def load(source: str, names: Mapping[str, Any] | None = None) -> Loaded:
+    """Have numba compile a module's ``kernel`` for its ``SIGNATURE``.
+
+    Args:
+        source: of the module.
+        names: what it finds under these names besides.
+    """
+    digest = hashlib.sha256(source.encode()).hexdigest()[:24]
+    if digest not in _loaded:
+        path = cache_folder() / f"loop_{digest}.py"
+        if not path.exists():
+            part = path.with_suffix(f".{os.getpid()}")
+            part.write_text(source)
+            part.replace(path)
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        # Where numba looks when it loads a compiled loop of another day.
+        sys.modules[path.stem] = module
+        spec.loader.exec_module(module)
+        vars(module).update(names or {})
+        compiled = njit(module.SIGNATURE, cache=True, nogil=True, error_model="numpy")
+        _loaded[digest] = Loaded(compiled(module.kernel), module)
+    return _loaded[digest]
+
+
+def cache_folder() -> Path:
+    """Where compiled loops are kept: MARL_AIRHOCKEY_CACHE, or the user's cache."""
+    given = os.environ.get("MARL_AIRHOCKEY_CACHE")
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    folder = Path(given) if given else Path(home) / "marl_airhockey"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if os.access(folder, os.W_OK):
+            return folder
+    except OSError:
+        pass
+    return Path(tempfile.mkdtemp(prefix="marl_airhockey-"))

@@ -1,0 +1,196 @@
+"""Arrays of symbols: numpy code run on them writes down the arithmetic of one world.
+
+An array of symbols is an object array, so that indexing, broadcasting and stacking are
+numpy's own; only arithmetic is recorded, element by element.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.types import Array
+
+Scalar = Any
+"""A symbol, or a number that is known when the code is traced."""
+
+
+class Untraceable(Exception):
+    """Code whose course depends on the numbers, or that uses what is not known here."""
+
+
+class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
+    """A number of one world: an operation on others, with its value in a sample."""
+
+    __slots__ = ("args", "op", "tape", "value")
+    __hash__ = object.__hash__
+
+    def __init__(self, tape: Tape, op: str, args: tuple[Scalar, ...], value: Any):
+        self.tape, self.op, self.args, self.value = tape, op, args, value
+
+    def __array_ufunc__(
+        self, ufunc: np.ufunc, method: str, *inputs: Any, **_: Any
+    ) -> Any:
+        if method != "__call__" or any(np.ndim(x) for x in inputs):
+            return NotImplemented
+        return _apply(ufunc.__name__, ufunc, *inputs)
+
+    def __bool__(self) -> bool:
+        raise Untraceable("it asks for the truth of a number that differs by world")
+
+    def __float__(self) -> float:
+        raise Untraceable("it turns a number that differs by world into a float")
+
+    __int__ = __index__ = __float__
+
+
+class Tape:
+    """All symbols of a trace, each operation once, in the order of their making."""
+
+    def __init__(self) -> None:
+        self.symbols: dict[Any, Symbol] = {}
+
+    def record(self, op: str, args: tuple[Scalar, ...], value: Any) -> Symbol:
+        """The symbol of an operation."""
+        key = (op, *(a if isinstance(a, Symbol) else (type(a), repr(a)) for a in args))
+        if key not in self.symbols:
+            self.symbols[key] = Symbol(self, op, args, value)
+        return self.symbols[key]
+
+    def array(self, name: tuple[int, str], sample: Array) -> Symbols:
+        """Symbols of an input of one world with the values of a sample."""
+        out = np.empty(sample.shape, object)
+        for index in np.ndindex(sample.shape):
+            value = sample[index]
+            out[index] = self.record("input", (name, index), value)
+        return out.view(Symbols)
+
+
+def _apply(op: str, function: Callable[..., Any], *args: Scalar) -> Scalar:
+    """One operation on scalars: a number if all are known, else a symbol."""
+    values = [a.value if isinstance(a, Symbol) else a for a in args]
+    with np.errstate(all="ignore"):
+        value = np.asarray(function(*values))[()]
+    for arg in args:
+        if isinstance(arg, Symbol):
+            return arg.tape.record(op, args, value)
+    return value.item()
+
+
+def _each(op: str, function: Callable[..., Any], arrays: Sequence[Any]) -> Symbols:
+    """An operation on arrays, element by element, with numpy's broadcasting."""
+
+    def one(*args: Scalar) -> Scalar:
+        return _apply(op, function, *args)
+
+    # Base-class arrays, or numpy would come back here.
+    plain = [np.asarray(a).astype(object) for a in arrays]
+    done = np.frompyfunc(one, len(plain), 1)(*plain)
+    out = np.empty(np.shape(done), object)
+    out[...] = done
+    return out.view(Symbols)
+
+
+def _where(condition: Any, yes: Any, no: Any) -> Symbols:
+    return _each("where", np.where, (condition, yes, no))
+
+
+def _clip(x: Any, low: Any, high: Any) -> Symbols:
+    raised = _each("maximum", np.maximum, (x, low))
+    return _each("minimum", np.minimum, (raised, high))
+
+
+def _matmul(a: Any, b: Any) -> Any:
+    a, b = (np.asarray(x).astype(object).view(Symbols) for x in (a, b))
+    return (a[..., :, :, None] * b[..., None, :, :]).sum(-2)
+
+
+def _zeros_like(a: Any) -> Array:
+    return np.zeros(np.shape(a))
+
+
+def _full_like(a: Any, value: float) -> Array:
+    return np.full(np.shape(a), value)
+
+
+SPECIAL: dict[Any, Callable[..., Any]] = {
+    np.where: _where,
+    np.clip: _clip,
+    np.matmul: _matmul,
+    np.zeros_like: _zeros_like,
+    np.full_like: _full_like,
+}
+"""Functions that are no operation on single elements."""
+
+
+class Symbols(np.ndarray[Any, Any]):
+    """An object array of symbols (and known numbers) that records what is done."""
+
+    def __array_ufunc__(
+        self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any
+    ) -> Any:
+        (out,) = options.pop("out", None) or (None,)
+        if method == "reduce":
+            done = _reduce(ufunc, inputs[0], **options)
+        elif method != "__call__":
+            raise Untraceable(f"{ufunc.__name__}.{method} is not known here")
+        elif ufunc in SPECIAL:
+            done = SPECIAL[ufunc](*inputs)
+        else:
+            done = _each(ufunc.__name__, ufunc, inputs)
+        if out is None:
+            return done
+        out[...] = done
+        return out
+
+    def __array_function__(
+        self, function: Any, types: Any, args: Any, kwargs: Any
+    ) -> Any:
+        if function in SPECIAL:
+            return SPECIAL[function](*args, **kwargs)
+        done = super().__array_function__(function, types, args, kwargs)
+        if isinstance(done, np.ndarray) and done.dtype == object:
+            return done.view(Symbols)
+        return done
+
+    def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
+        """Symbols of the numbers as another type."""
+        kind = np.dtype(dtype)
+        return _each(kind.name, kind.type, (self,))
+
+
+def _reduce(
+    ufunc: np.ufunc,
+    array: Any,
+    axis: Any = 0,
+    dtype: Any = None,
+    keepdims: bool = False,
+    **_: Any,
+) -> Symbols:
+    """A reduction as a chain of operations."""
+    symbols: Array = np.asarray(array).astype(object)
+    chosen = range(symbols.ndim) if axis is None else np.atleast_1d(axis)
+    axes = sorted(int(a) % symbols.ndim for a in chosen)
+    kept = [a for a in range(symbols.ndim) if a not in axes]
+    shape = [symbols.shape[a] for a in kept]
+    rows = symbols.transpose(*kept, *axes).reshape(*shape, -1)
+    out = np.empty(shape, object)
+    for index in np.ndindex(*shape):
+        items = list(rows[index]) or [ufunc.identity]
+        if ufunc is np.add:
+            items = [_counted(item) for item in items]
+        out[index] = reduce(lambda a, b: _apply(ufunc.__name__, ufunc, a, b), items)
+    if keepdims:
+        out = np.expand_dims(out, tuple(axes))
+    return out.view(Symbols)
+
+
+def _counted(item: Scalar) -> Scalar:
+    """A sum takes truths as 0 and 1."""
+    value = item.value if isinstance(item, Symbol) else item
+    if isinstance(value, (bool, np.bool_)):
+        return _apply("int64", np.int64, item)
+    return item

@@ -1,0 +1,199 @@
+"""Self-play: worlds in which the learner meets itself, its past and scripts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.evaluation.games import teams_of
+from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.make import make_sb3_vec
+from marl_airhockey.registry import make_driver
+from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.policies import frozen_policy
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.episode import StepResult
+from marl_airhockey.world.roster import Roster
+
+MEMORY = 0.05
+"""Weight of the newest game in the running score against an opponent."""
+
+
+class Arena(AirHockeyVecEnv):
+    """Slots of the learner: all seats of some worlds, one team's in the others.
+
+    At every start of an episode in those others the learner gets a team, and every
+    other team the same opponent, drawn from scripts and from the pool of snapshots: the
+    more likely, the more often the learner loses to it (prioritised fictitious
+    self-play; Vinyals et al., 2019).
+
+    Args:
+        scenario: a game with teams.
+        num_worlds: B.
+        keywords: of the environment.
+        scripts: drivers, by name; always in the pool.
+        mirror: share of the worlds in which the learner plays all seats.
+        script_share: share of the other worlds' games that are against scripts.
+        priority: the power of the share of lost games in the drawing.
+        size: most snapshots in the pool.
+        folder: where snapshots are kept.
+        seed: of the drawing.
+    """
+
+    def __init__(
+        self,
+        scenario: str,
+        num_worlds: int,
+        keywords: Keywords,
+        scripts: Sequence[str],
+        mirror: float,
+        script_share: float,
+        priority: float,
+        size: int,
+        folder: Path,
+        seed: int,
+    ) -> None:
+        super().__init__(scenario, num_worlds, **keywords)
+        scene = self.world.scene
+        self._teams = teams_of([seat.team for seat in scene.seats])
+        members = [np.flatnonzero(self._teams == t) for t in np.unique(self._teams)]
+        self._members = np.array(members)
+        self._mirrored = round(mirror * num_worlds)
+        self._priority, self._size, self._folder = priority, size, folder
+        self._script_share = script_share if scripts else 0.0
+        self._rng = np.random.default_rng(seed)
+        self._roster = Roster(self.world)
+        for name in scripts:
+            self._roster.add(name, make_driver(name))
+        self._scripts = len(scripts)
+        self._scores = np.full(self._scripts, 0.5)
+        self._snapshots: list[Path] = []
+        mirrored = np.arange(self._mirrored)
+        others = np.arange(self._mirrored, num_worlds)
+        each, mates = len(scene.seats), self._members.shape[1]
+        self._rows = np.concatenate([mirrored.repeat(each), others.repeat(mates)])
+        self._seats = np.tile(np.arange(each), len(mirrored))
+        self._seats = np.concatenate([self._seats, np.zeros(len(others) * mates, int)])
+        self._learner = np.zeros(num_worlds, np.int64)
+        self.num_envs = len(self._rows)
+        self._returns = np.zeros(self.num_envs)
+        self._lengths = np.zeros(self.num_envs, np.int64)
+        for path in sorted(folder.glob("*.npz")):
+            self._enlist(path)
+
+    @property
+    def scores(self) -> dict[str, float]:
+        """The learner's running score against everybody, by name."""
+        names = self._roster.names
+        return dict(zip(names, self._scores.tolist(), strict=True))
+
+    def snapshot(self, policy: Frozen, steps: int) -> None:
+        """Take the learner as it is into the pool; an old one that it beats leaves."""
+        self._folder.mkdir(parents=True, exist_ok=True)
+        path = self._folder / f"{steps:012d}.npz"
+        policy.save(path)
+        self._enlist(path)
+
+    def _enlist(self, path: Path) -> None:
+        driver = frozen_policy(Frozen.load(path), str(path), deterministic=False)
+        if len(self._snapshots) < self._size:
+            self._roster.add(path.stem, driver)
+            self._scores = np.append(self._scores, 0.5)
+            self._snapshots.append(path)
+            return
+        beaten = int(self._scores[self._scripts :].argmax())
+        player = self._scripts + beaten
+        self._snapshots[beaten].unlink()
+        self._snapshots[beaten] = path
+        self._roster.replace(player, path.stem, driver)
+        self._scores[player] = 0.5
+        self._begin(np.flatnonzero((self._roster.seated == player).any(-1)))
+
+    def _draw(self, count: int) -> Array:
+        """(count,) opponents."""
+        weight = np.maximum(1.0 - self._scores, 0.0) ** self._priority + 0.02
+        groups = slice(0, self._scripts), slice(self._scripts, None)
+        shares = self._script_share, 1.0 - self._script_share
+        for group, share in zip(groups, shares, strict=True):
+            total = weight[group].sum()
+            weight[group] *= share / total if total else 0.0
+        return self._rng.choice(len(weight), count, p=weight / weight.sum())
+
+    def _begin(self, worlds: Array) -> None:
+        """Draw teams and opponents for the episodes that begin in some worlds."""
+        worlds = worlds[worlds >= self._mirrored]
+        if not len(worlds) or not len(self._scores):
+            return
+        seated = self._roster.seated
+        seated[worlds] = self._draw(len(worlds))[:, None]
+        self._learner[worlds] = self._rng.integers(0, len(self._members), len(worlds))
+        mine = self._members[self._learner[worlds]]
+        seated[worlds[:, None], mine] = -1
+        slots = self._mirrored * len(self._teams)
+        mates = self._members.shape[1]
+        first = slots + (worlds - self._mirrored) * mates
+        self._seats[first[:, None] + np.arange(mates)] = mine
+        self._roster.begin(worlds)
+
+    def _restarted(self, worlds: Array, last: StepResult) -> None:
+        """Take the results of games into the running scores; draw new opponents."""
+        seats = self._members[:, 0]
+        for world in worlds[worlds >= self._mirrored].tolist():
+            won = last.success[world, seats]
+            player = self._roster.seated[world].max()
+            score = float(won[self._learner[world]])
+            if not won.any():
+                score = 1.0 / len(seats)
+            self._scores[player] += MEMORY * (score - self._scores[player])
+        self._begin(worlds)
+
+    def _pick(self, rows: Array) -> Array:
+        return np.asarray(rows[self._rows, self._seats])
+
+    def _done(self, ended: Array) -> Array:
+        return np.asarray(ended[self._rows])
+
+    def _world(self, slot: int) -> int:
+        return int(self._rows[slot])
+
+    def reset(self) -> Any:
+        """Begin an episode in every world."""
+        self._returns[:], self._lengths[:] = 0.0, 0
+        observation = self.world.reset()
+        self._begin(np.arange(self.world.num_worlds))
+        return self._slots(observation)
+
+    def step_async(self, actions: Array) -> None:
+        """Take the learner's actions (slots, 2) and ask the opponents for theirs."""
+        self._actions = np.zeros((self.world.num_worlds, len(self._teams), 2))
+        self._actions[self._rows, self._seats] = actions
+        self._roster.ask(self._actions)
+
+
+def environment(config: TrainConfig, num_worlds: int, pool: Path) -> AirHockeyVecEnv:
+    """The worlds that a configuration is trained in, or a part of them.
+
+    Args:
+        config: of the run.
+        num_worlds: how many of them.
+        pool: folder of the snapshots of self-play.
+    """
+    if not config.self_play:
+        return make_sb3_vec(config.scenario, num_worlds, **config.keywords)
+    return Arena(
+        config.scenario,
+        num_worlds,
+        config.keywords,
+        config.opponents,
+        config.mirror,
+        config.script_share,
+        config.priority,
+        config.pool,
+        pool,
+        config.seed,
+    )

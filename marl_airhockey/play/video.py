@@ -1,0 +1,73 @@
+"""A video of a recording."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.core.state import State, still_state
+from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.registry import make_scenario
+from marl_airhockey.render.renderer import Frame, Renderer, draw
+from marl_airhockey.render.video import write_video
+
+EVERY = 2
+"""Control steps from one picture to the next: 30 pictures a second."""
+
+
+def film(recording: Path, video: Path, width: int = 640) -> None:
+    """Draw a recording as `airhockey watch` draws what is played now.
+
+    Raises:
+        ValueError: no recording, or a video that ends in neither .gif nor .mp4.
+    """
+    meta, steps, _ = read(recording)
+    if not steps:
+        raise ValueError(f"{recording}: there are no steps in it")
+    name = meta["court"]["scenario"]
+    scenario = make_scenario(name, **meta["options"])
+    scene = scenario.scene
+    blank = still_state(scene.bodies, 1, len(scene.goal_lines)).map(lambda x: x[0])
+    trails: list[deque[tuple[float, float]]] = [
+        deque(maxlen=Renderer.TRAIL) for _ in range(scene.pucks)
+    ]
+    pictures = []
+    for row in steps:
+        for trail, puck in zip(trails, row["pucks"], strict=True):
+            trail.append((puck[0], puck[1]))
+        if row["n"] % EVERY:
+            continue
+        frame = Frame(
+            scene=scene,
+            state=_state(blank, row),
+            marks=[_mark(mark) for mark in row["marks"]],
+            trails=[list(trail) for trail in trails],
+            title=name.replace("_", " "),
+            note=f"{row['caption']}   {row['time']:4.1f} s",
+            clock=row["time"] / meta["court"]["seconds"],
+            success=bool(row["success"]),
+            retired=[i in row["retired"] for i in range(len(scene.seats))],
+        )
+        pictures.append(draw(frame, width))
+    write_video(video, pictures, 1 / (EVERY * meta["control_dt"]))
+
+
+def _state(blank: State, row: dict[str, Any]) -> State:
+    bodies = blank.bodies
+    position, angle = blank.position.copy(), blank.angle.copy()
+    position[bodies.paddle] = row["pads"]
+    if row["pucks"]:
+        position[bodies.puck] = np.array(row["pucks"])[:, :2]
+    if row["blocks"]:
+        position[bodies.block], angle[bodies.block] = row["blocks"], row["angles"]
+    return replace(blank, position=position, angle=angle)
+
+
+def _mark(row: list[Any]) -> Mark:
+    kind, ax, ay, bx, by, radius = row
+    return Mark(kind, (ax, ay), (bx, by), radius)

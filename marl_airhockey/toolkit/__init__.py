@@ -1,0 +1,1 @@
+"""What scenario and agent files are made with."""

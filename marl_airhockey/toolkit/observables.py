@@ -1,0 +1,267 @@
+"""Observation pieces that scenarios share: what a seat is shown.
+
+A scenario lists pieces; spaces, labels and scales follow from their columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.contracts.observable import (
+    HISTORY,
+    Column,
+    EgoView,
+    Observable,
+    ObservationContext,
+)
+from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.touches import touched
+from marl_airhockey.types import Array
+
+
+@dataclass(frozen=True)
+class OwnPaddle(Observable):
+    """The seat's own paddle: position and velocity, as its robot reports them."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        centre = float(np.mean([x for x, _ in scope.scene.seats[0].reach]))
+        return scope.place("own", (0.2, 0.2), centre) + scope.motion(
+            "own", scope.top_speed, scope.top_speed
+        )
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        out[..., :2] = ego.own
+        out[..., 2:] = ego.own_velocity
+
+
+@dataclass(frozen=True)
+class OtherPaddles(Observable):
+    """The other paddles, mates first, each group by ego angle of its seat's side."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        columns = []
+        for i in range(len(scope.scene.seats) - 1):
+            columns += scope.place(f"other_{i}", (0.5, 0.2))
+            columns += scope.motion(f"other_{i}", scope.top_speed, scope.top_speed)
+        return columns
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        order = _others(ego.scope.scene)
+        rows = np.arange(len(order))[:, None]
+        place = ego.turn(ego.state.paddle)[..., rows, order, :]
+        motion = ego.turn(ego.state.paddle_velocity)[..., rows, order, :]
+        both = np.concatenate([place, motion], -1)
+        out[...] = both.reshape(out.shape)
+
+
+def _others(scene: Scene) -> Array:
+    """(S, S - 1) indices of the other seats: mates, then opponents, by ego angle."""
+    angles = np.arctan2(*scene.table.normals.T[::-1])
+    rows = []
+    for me, seat in enumerate(scene.seats):
+        key = {
+            k: (
+                other.team != seat.team,
+                float((angles[other.side] - angles[seat.side]) % (2 * np.pi)),
+                k,
+            )
+            for k, other in enumerate(scene.seats)
+            if k != me
+        }
+        rows.append(sorted(key, key=key.__getitem__))
+    return np.array(rows, dtype=np.int64).reshape(len(scene.seats), -1)
+
+
+@dataclass(frozen=True)
+class Pucks(Observable):
+    """Every puck: position and velocity, or its sensed history."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        columns: list[Column] = []
+        for i in range(scope.scene.pucks):
+            if scope.observe == "velocity":
+                columns += scope.place(f"puck_{i}", (0.67, 0.25))
+                columns += scope.motion(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
+            else:
+                for ago in range(HISTORY - 1, -1, -1):
+                    columns += scope.place(f"puck_{i}[-{ago}]", (0.67, 0.25))
+                    columns.append(Column(f"puck_{i}[-{ago}].seen", 0.0, 1.0, 1.0))
+        return columns
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        if ego.scope.observe == "velocity":
+            for i in range(ego.scope.scene.pucks):
+                out[..., 4 * i : 4 * i + 2] = ego.puck[..., i, :]
+                out[..., 4 * i + 2 : 4 * i + 4] = ego.puck_velocity[..., i, :]
+            return
+        lead = ego.history.shape[:-3]
+        flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 3)
+        place = ego.turn(flat[..., :2])
+        seen = np.broadcast_to(flat[..., None, :, 2:], (*place.shape[:-1], 1))
+        both = np.concatenate([place, seen], -1)
+        out[...] = both.reshape(out.shape)
+
+
+@dataclass(frozen=True)
+class OwnToPucks(Observable):
+    """The way from the seat's own paddle to every puck."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        names = [f"own_to_puck_{i}" for i in range(scope.scene.pucks)]
+        return [c for name in names for c in scope.gap(name, (0.25, 0.125))]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        out[...] = (ego.puck - ego.own[..., None, :]).reshape(out.shape)
+
+
+@dataclass(frozen=True)
+class Blocks(Observable):
+    """Where every block is now."""
+
+    x: float
+    """Where blocks are to be expected, m."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        names = [f"block_{i}" for i in range(scope.scene.blocks)]
+        return [c for name in names for c in scope.place(name, (0.3, 0.2), self.x)]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        out[...] = ego.turn(ego.state.block).reshape(out.shape)
+
+
+@dataclass(frozen=True)
+class PuckToBlocks(Observable):
+    """The way from puck 0 to every block."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        names = [f"puck_0_to_block_{i}" for i in range(scope.scene.blocks)]
+        return [c for name in names for c in scope.gap(name, (1.0, 0.5))]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        gap = ego.turn(ego.state.block) - ego.puck[..., :1, :]
+        out[...] = gap.reshape(out.shape)
+
+
+@dataclass(frozen=True)
+class Touched(Observable):
+    """1 once any paddle has touched any puck."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        return [Column("touched", 0.0, 1.0, 1.0)]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        out[...] = touched(ego.memory)[..., None, None]
+
+
+@dataclass(frozen=True)
+class Goal(Observable):
+    """A wanted place, and its way from the own paddle or from puck 0.
+
+    ``memory["goal"]`` is (..., 2) in the table frame.
+    """
+
+    unit: tuple[float, float]
+    x: float
+    origin: str
+    """"own" or "puck": what the goal is for."""
+    goal = True
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        return scope.place("goal", self.unit, self.x) + scope.gap(
+            f"{self.origin}_to_goal", self.unit
+        )
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        goal = ego.turn(ego.memory["goal"][..., None, :])[..., 0, :]
+        out[..., :2] = goal
+        out[..., 2:] = goal - (ego.own if self.origin == "own" else ego.puck[..., 0, :])
+
+
+@dataclass(frozen=True)
+class GoalVelocity(Observable):
+    """A wanted velocity, ``memory["goal_velocity"]`` (..., 2) in the table frame."""
+
+    most: float
+    unit: float
+    goal = True
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        return scope.motion("goal", self.most, self.unit)
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        out[...] = ego.turn(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
+
+
+@dataclass(frozen=True)
+class PossessionTime(Observable):
+    """How long each puck has been in the reach of one's own team, s; see `held`."""
+
+    most: float
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        names = [f"held_{i}" for i in range(scope.scene.pucks)]
+        return [Column(name, 0.0, self.most, 0.4 * self.most) for name in names]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        out[...] = ego.memory["held"]
+
+
+@dataclass(frozen=True)
+class PerSeat(Observable):
+    """Everybody's number of the memory (..., seats), one's own first, then `Others`."""
+
+    name: str
+    most: float
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        others = [f"other_{i}" for i in range(len(scope.scene.seats) - 1)]
+        names = [f"{who}.{self.name}" for who in ("own", *others)]
+        return [Column(name, 0.0, self.most, self.most) for name in names]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        value = ego.memory[self.name]
+        out[..., 0] = value
+        out[..., 1:] = value[..., _others(ego.scope.scene)]
+
+
+@dataclass(frozen=True)
+class IsThisSeat(Observable):
+    """Whose number the memory holds: 1 one's own, -1 another's, 0 nobody's.
+
+    ``memory[name]`` is (...) or, one a puck, (..., pucks); see `rewards.last_toucher`.
+    """
+
+    name: str
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        names = [f"{self.name}_{i}" for i in range(scope.scene.pucks)]
+        return [Column(name, -1.0, 1.0, 1.0) for name in names]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        who = ego.memory[self.name]
+        rows = who.reshape(*ego.state.time.shape, 1, -1)
+        own = 1.0 + np.arange(len(ego.scope.scene.seats))[:, None]
+        out[...] = np.where(rows == 0.0, 0.0, np.where(rows == own, 1.0, -1.0))
+
+
+@dataclass(frozen=True)
+class FromMemory(Observable):
+    """Numbers of the memory, one a puck, that are no vectors: flags and heights."""
+
+    name: str
+    low: float
+    high: float
+    unit: float
+    from_own: bool = False
+    """True to show a height as seen from the own paddle."""
+
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        names = [f"{self.name}_{i}" for i in range(scope.scene.pucks)]
+        return [Column(name, self.low, self.high, self.unit) for name in names]
+
+    def write(self, ego: EgoView, out: Array) -> None:
+        value = ego.memory[self.name][..., None, :]
+        out[...] = value - ego.own[..., :1] if self.from_own else value

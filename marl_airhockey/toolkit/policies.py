@@ -1,0 +1,163 @@
+"""Policies from files: what `train` saved, any SB3 zip, ONNX and frozen ones."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.core.errors import require
+from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.types import Array
+
+Predict = Callable[[Any, bool], Array]
+KINDS = ("zip", "npz")
+"""What engines write: stable-baselines3 files, frozen ones."""
+
+
+@dataclass
+class Policy(Driver):
+    """A learned policy as a driver.
+
+    Args:
+        predict: observation (B, ...) and whether to be deterministic -> (B, 2).
+        shape: of the observation that it was trained on; None if it does not say.
+        observe: the form of that observation; None for the environment's.
+        source: where it came from, for messages.
+        deterministic: act by the mean rather than sample.
+    """
+
+    predict: Predict
+    shape: tuple[int, ...] | None = None
+    observe: str | None = None
+    source: str = "policy"
+    deterministic: bool = True
+    noise: Array | None = None
+    """(2,) deviation of sampled actions, if `predict` gives means alone."""
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        seen = view.observation
+        if not isinstance(seen, Mapping) and self.shape not in (None, seen.shape[1:]):
+            raise ValueError(
+                f"{self.source}: it expects observations of shape {self.shape}, "
+                f"this environment gives {seen.shape[1:]}; it was trained on another "
+                "scenario, or with other options (observe, goals, seats)"
+            )
+        action = np.asarray(self.predict(seen, self.deterministic), np.float64)
+        if self.noise is not None and not self.deterministic:
+            action += self.noise * view.rng.normal(2)
+        return np.clip(action, -1.0, 1.0), memory
+
+
+def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
+    """Load a policy: a run folder of `train`, an SB3 .zip, an .onnx or a frozen .npz.
+
+    An SB3 zip holds pickled Python: load only files that you trust.
+
+    Raises:
+        ValueError: not such a file; the message says what was expected.
+        RuntimeError: a missing extra, with the line that installs it.
+    """
+    path = Path(path)
+    if path.is_dir():
+        kept = [path / f"{n}.{kind}" for n in ("best", "last") for kind in KINDS]
+        path = next((file for file in kept if file.exists()), kept[0])
+    if not path.exists():
+        raise ValueError(f"{path}: there is no such policy file")
+    if path.suffix == ".npz":
+        return frozen_policy(Frozen.load(path), str(path), deterministic)
+    if path.suffix == ".onnx":
+        return _load_onnx(path, deterministic)
+    if path.suffix == ".zip":
+        return _load_sb3(path, deterministic)
+    raise ValueError(
+        f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file or a "
+        "frozen .npz"
+    )
+
+
+def frozen_policy(frozen: Frozen, source: str, deterministic: bool = True) -> Policy:
+    """A frozen network as a driver."""
+    return Policy(
+        lambda observation, _: frozen(observation),
+        frozen.centre.shape,
+        frozen.card.get("observe"),
+        source,
+        deterministic,
+        np.exp(frozen.log_std),
+    )
+
+
+def _load_sb3(path: Path, deterministic: bool) -> Policy:
+    require("stable_baselines3", "train")
+    import stable_baselines3 as sb3
+
+    wrong = f"{path}: not a stable-baselines3 policy"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            data = json.loads(archive.read("data"))
+        module = data["policy_class"]["__module__"]
+    except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{wrong} ({error})") from error
+    families: dict[str, Any] = {"sac": sb3.SAC, "td3": sb3.TD3, "common": sb3.PPO}
+    kinds = [kind for name, kind in families.items() if f".{name}." in module]
+    if not kinds:
+        raise ValueError(f"{wrong} of PPO, A2C, SAC, TD3 or DDPG (found {module})")
+    try:
+        # Without the schedules of training, which a policy does not need.
+        plain = {"lr_schedule": lambda _: 0.0, "clip_range": lambda _: 0.0}
+        model = kinds[0].load(path, device="cpu", custom_objects=plain)
+    except Exception as error:
+        raise ValueError(f"{wrong}: {error}") from error
+    if model.action_space.shape != (2,):
+        raise ValueError(f"{path}: its action space is {model.action_space}, not (2,)")
+    card = getattr(model, "card", {})
+
+    def predict(observation: Any, mean: bool) -> Array:
+        return np.asarray(model.predict(observation, deterministic=mean)[0])
+
+    return Policy(
+        predict,
+        model.observation_space.shape,
+        card.get("observe"),
+        str(path),
+        deterministic,
+    )
+
+
+def _load_onnx(path: Path, deterministic: bool) -> Policy:
+    require("onnxruntime", "offline")
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    try:
+        session = onnxruntime.InferenceSession(
+            str(path), options, providers=["CPUExecutionProvider"]
+        )
+    except Exception as error:
+        raise ValueError(f"{path}: not an ONNX model: {error}") from error
+    inputs = session.get_inputs()
+    if len(inputs) != 1:
+        raise ValueError(f"{path}: expected one input, found {len(inputs)}")
+    shape = tuple(n for n in inputs[0].shape[1:] if isinstance(n, int))
+
+    def predict(observation: Any, mean: bool) -> Array:
+        rows = np.asarray(observation, np.float32)
+        out = np.asarray(session.run(None, {inputs[0].name: rows})[0])
+        if out.shape != (len(rows), 2):
+            raise ValueError(
+                f"{path}: expected actions of shape {(len(rows), 2)}, got {out.shape}"
+            )
+        return out
+
+    known = shape if len(shape) == len(inputs[0].shape) - 1 else None
+    return Policy(predict, known, None, str(path), deterministic)

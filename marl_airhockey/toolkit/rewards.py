@@ -1,0 +1,124 @@
+"""What scenarios share when they judge a step: touches, entries, regularising terms.
+
+All functions are pure and vectorised over whatever leading axes the caller has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marl_airhockey.core.geometry import length as length
+from marl_airhockey.core.state import State
+from marl_airhockey.core.touches import count_touches as count_touches
+from marl_airhockey.core.touches import no_touches as no_touches
+from marl_airhockey.core.touches import touched as touched
+from marl_airhockey.toolkit.lifts import contact_height as contact_height
+from marl_airhockey.toolkit.lifts import lifts as lifts
+from marl_airhockey.toolkit.lifts import no_lifts as no_lifts
+from marl_airhockey.toolkit.possession import SLOW as SLOW
+from marl_airhockey.toolkit.possession import held as held
+from marl_airhockey.toolkit.possession import in_reach as in_reach
+from marl_airhockey.toolkit.possession import last_toucher as last_toucher
+from marl_airhockey.toolkit.possession import lying as lying
+from marl_airhockey.types import Array, Memory
+
+
+def tolerance(value: Array, bound: float, margin: float) -> Array:
+    """1 where ``value`` is at most ``bound``, falling smoothly to e^-1 at ``margin``.
+
+    The one shape for "close is good" (after the function of that name in dm_control).
+
+    Args:
+        value: (...) a distance or an error, not negative.
+        bound: up to here it is perfect.
+        margin: how far beyond the bound the value has fallen to e^-1.
+    """
+    return np.exp(-np.maximum(value - bound, 0.0) / margin)
+
+
+def nearest(memory: Memory, after: State) -> Array:
+    """(...) shortest distance of paddle 0 to puck 0 up to the first touch, m.
+
+    What it shrank by is the reward for going to the puck; being a best so far, it
+    cannot be farmed by going to and fro.
+    """
+    gap = length(after.puck[..., 0, :] - after.paddle[..., 0, :])
+    return np.where(touched(memory), memory["gap"], np.minimum(memory["gap"], gap))
+
+
+def gained(old: Array, new: Array) -> Array:
+    """What a best distance shrank by; nothing as long as there was none (infinite)."""
+    none = np.isinf(old)
+    return np.where(none, 0.0, np.where(none, 0.0, old) - np.where(none, 0.0, new))
+
+
+def alike(
+    velocity: Array, wanted: Array, angle: float, share: float, slack: float
+) -> Array:
+    """(...) bool: two velocities agree in direction and speed.
+
+    Args:
+        velocity: (..., 2) m/s.
+        wanted: (..., 2) m/s.
+        angle: largest angle between them, rad.
+        share: largest error of the speed, as a share of the wanted speed.
+        slack: this much more, m/s.
+    """
+    speed, aim = length(velocity), length(wanted)
+    along = (velocity * wanted).sum(-1) >= np.cos(angle) * speed * aim
+    agree: Array = along & (np.abs(speed - aim) <= share * aim + slack)
+    return agree
+
+
+def enters(
+    memory: Memory,
+    before: State,
+    after: State,
+    centre: Array,
+    radius: float,
+    velocity: Array | None = None,
+    angle: float = np.pi,
+    speed_share: float = 0.0,
+    speed_slack: float = 0.0,
+) -> tuple[Array, Array, Array]:
+    """Judge the path of puck 0 against a circle, at every substep after a touch.
+
+    Only moments count at which the puck has been touched and rises (moves away from
+    home).
+
+    Args:
+        memory: of `count_touches`, before this step.
+        before: the state before the step.
+        after: the state after it, with ``path`` (..., K + 1, movers, 4).
+        centre: (..., 2) of the circle, m.
+        radius: of the circle, m.
+        velocity: (..., 2) wanted velocity in the circle, m/s; None for any.
+        angle: largest angle to the wanted velocity, rad.
+        speed_share: largest error of the speed, as a share of the wanted speed.
+        speed_slack: this much more, m/s.
+
+    Returns:
+        ``entered`` (...) bool; ``gap`` (..., K + 1) to the circle's edge in m, infinite
+        where a moment does not count; ``error`` (..., K + 1) of the velocity, m/s.
+
+    Raises:
+        ValueError: a state without a path.
+    """
+    if after.path is None:
+        raise ValueError("enters: the scene must ask for the path (path=True)")
+    puck = after.path[..., after.bodies.paddles, :]
+    dt = (after.time - before.time)[..., None]
+    moment = dt * np.linspace(0.0, 1.0, puck.shape[-2])
+    contact = np.where(after.touched > 0, after.touched_at, np.inf).min((-1, -2))
+    counts = touched(memory)[..., None] | (moment >= contact[..., None] - 1e-9)
+    counts &= puck[..., 2] > 0
+    gap = length(puck[..., :2] - centre[..., None, :]) - radius
+    gap = np.where(counts, gap, np.inf)
+    inside = gap < 0
+    error = np.zeros_like(gap)
+    if velocity is not None:
+        wanted = velocity[..., None, :]
+        error = length(puck[..., 2:] - wanted)
+        inside &= alike(puck[..., 2:], wanted, angle, speed_share, speed_slack)
+    entered: Array = np.logical_or.reduce(inside, axis=-1)
+    return entered, gap, error

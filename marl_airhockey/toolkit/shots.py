@@ -1,0 +1,100 @@
+"""Goals that can be met: moments of legal shots at a falling puck."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.table import GRAVITY
+from marl_airhockey.toolkit.starts import falling_puck, roll
+from marl_airhockey.types import Array
+
+SECONDS = np.arange(0.0, 2.5, 0.005)
+TRIES = 20
+"""Shots tried at a puck before another puck is drawn."""
+
+
+def legal_shots(rng: RandomStreams, scene: Scene) -> tuple[Array, Array]:
+    """Draw falling pucks and for each a moment of a shot that a robot seat can play.
+
+    The puck falls to x in -0.65 .. -0.30 and is struck there with a contact normal
+    within 0.5 rad of straight up and a normal paddle speed of 0 .. 0.6 m/s, the
+    paddle's centre lying in x -0.74 .. -0.38 and |y| <= 0.24; it rolls on with banks.
+    The moment is a random one of that path with x 0.05 .. 0.738, |y| < 0.205, within
+    30 deg of straight up and vx at least 0.5 m/s.
+
+    Returns:
+        (W, 4) x, y, vx, vy of the puck at its start, and (W, 4) of the moment.
+
+    Raises:
+        RuntimeError: no shot was found in 100 pucks.
+    """
+    pucks, goals = np.zeros((len(rng), 4)), np.zeros((len(rng), 4))
+    open_rows = np.arange(len(rng))
+    for attempt in range(100 * TRIES):
+        some = rng.select(open_rows)
+        if attempt % TRIES == 0:
+            pucks[open_rows] = np.concatenate(falling_puck(some), -1)
+        goal, found = _shoot(some, pucks[open_rows], scene)
+        goals[open_rows[found]] = goal[found]
+        open_rows = open_rows[~found]
+        if not len(open_rows):
+            return pucks, goals
+    raise RuntimeError("start: no legal shot in 100 pucks")
+
+
+def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]:
+    """One shot at each puck: a random goal moment (W, 4), and whether there is one."""
+    table, physics = scene.table, {k: p.default for k, p in PARAMETERS.items()}
+    physics.update(scene.defaults)
+    ways = (
+        GRAVITY * np.sin(np.radians(physics["tilt"])),
+        physics["puck_damping"],
+        float(table.size[1]) / 2 - table.puck_radius,
+        physics["wall_restitution"],
+    )
+    height = rng.uniform(-0.65, -0.30)
+    angle = rng.uniform(-0.5, 0.5)
+    push = rng.uniform(0.0, 0.6)
+    choice = rng.uniform(0.0, 1.0)
+    rows = np.arange(len(rng))
+
+    fall = roll(puck[:, :2], puck[:, 2:], SECONDS, *ways)
+    met = fall[rows, (fall[..., 0] <= height[:, None]).argmax(-1)]
+    normal = np.stack([np.cos(angle), np.sin(angle)], -1)
+    paddle = met[:, :2] - normal * (table.paddle_radius + table.puck_radius)
+    legal = (met[:, 0] <= height) & (np.abs(paddle[:, 1]) <= 0.24)
+    legal &= (paddle[:, 0] >= -0.74) & (paddle[:, 0] <= -0.38)
+
+    closing = (met[:, 2:] * normal).sum(-1) - push
+    bounce = (1 + physics["paddle_restitution"]) * closing
+    path = roll(met[:, :2], met[:, 2:] - bounce[:, None] * normal, SECONDS, *ways)
+    moment = np.empty(len(rows), np.int64)
+    _choose(path, table.size[0] / 2 - table.puck_radius, choice, moment)
+    return path[rows, moment], legal & (closing < 0) & (moment >= 0)
+
+
+@njit(cache=True)
+def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
+    """A random good moment of each path (W, T, 4) while it rises; -1 if none is."""
+    steep = np.tan(np.radians(30.0))
+    for w in range(len(path)):
+        good, moment[w] = 0, -1
+        # Twice: the first time to count the good moments, the second to take one.
+        for turn in range(2):
+            wanted, count = int(choice[w] * good) if turn else -1, 0
+            for t in range(path.shape[1]):
+                x, y = path[w, t, 0], path[w, t, 1]
+                vx, vy = path[w, t, 2], path[w, t, 3]
+                if vx <= 0.2 or x >= end:
+                    break
+                if not (0.05 < x < 0.738 and abs(y) < 0.205):
+                    continue
+                if vx >= 0.5 and abs(vy) < steep * vx:
+                    if count == wanted:
+                        moment[w] = t
+                    count += 1
+            good = count

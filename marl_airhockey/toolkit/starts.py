@@ -1,0 +1,196 @@
+"""Samplers of first states that scenarios share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.core.geometry import half_planes
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State, still_state
+from marl_airhockey.types import Array
+
+PADDLE_X = (-0.70, -0.60)
+PADDLE_Y = (-0.10, 0.10)
+"""m: where a single paddle starts unless its scenario says otherwise."""
+
+
+def place(rng: RandomStreams, x: tuple[float, float], y: tuple[float, float]) -> Array:
+    """(W, 2) points uniform in a box of the standard table, m."""
+    low, high = _corners(x, y)
+    return rng.uniform(low, high, 2)
+
+
+@cache
+def _corners(x: tuple[float, float], y: tuple[float, float]) -> tuple[Array, Array]:
+    low, high = np.array([x, y]).T
+    return low, high
+
+
+def first_state(scene: Scene, worlds: int) -> State:
+    """Rows with everything at the origin, at rest; obstacles at their places."""
+    state = still_state(scene.bodies, worlds, len(scene.goal_lines))
+    first = scene.bodies.movers
+    for i, obstacle in enumerate(scene.obstacles):
+        state.position[:, first + i] = obstacle.start
+    return state
+
+
+def falling_puck(rng: RandomStreams) -> tuple[Array, Array]:
+    """A puck on its way down from the far half: (W, 2) position and velocity."""
+    position = place(rng, (0.4, 0.8), (-0.2, 0.2))
+    velocity = place(rng, (-1.0, -0.2), (-0.3, 0.3))
+    return position, velocity
+
+
+def falling(rng: RandomStreams, scene: Scene) -> State:
+    """One paddle at home and every puck falling from the far half, none on another."""
+    state = first_state(scene, len(rng))
+    state.position[:, 0] = place(rng, PADDLE_X, PADDLE_Y)
+    first = scene.bodies.puck.start
+    for k in range(first, scene.bodies.puck.stop):
+        others = state.position[:, first:k]
+
+        def apart(rows: Array, others: Array = others) -> Array:
+            gap = np.linalg.norm(rows[:, None, 0] - others, axis=-1)
+            return np.asarray((gap > 3 * scene.table.puck_radius).all(-1))
+
+        if k == first:
+            state.position[:, k], state.velocity[:, k] = falling_puck(rng)
+            continue
+        puck = redraw(rng, lambda some: np.stack(falling_puck(some), 1), apart)
+        state.position[:, k], state.velocity[:, k] = puck[:, 0], puck[:, 1]
+    return state
+
+
+def serve(
+    rng: RandomStreams,
+    state: State,
+    puck: int,
+    heading: Array,
+    rows: Array | None = None,
+) -> None:
+    """Put a puck to the centre, on its way at 0.5 m/s within 0.3 rad of a heading.
+
+    In place; paddles stay where they are. Several pucks have places beside each other.
+
+    Args:
+        rng: one stream a row.
+        state: rows (W,).
+        puck: which.
+        heading: (W,) or (), rad in the table frame.
+        rows: (W,) bool: which rows are served; None for all.
+    """
+    angle = heading + rng.uniform(-0.3, 0.3)
+    place = np.array([0.0, 0.12 * (puck - 0.5 * (state.bodies.pucks - 1))])
+    motion = 0.5 * np.stack([np.cos(angle), np.sin(angle)], -1)
+    some = slice(None) if rows is None else rows
+    state.puck[some, puck], state.puck_velocity[some, puck] = place, motion[some]
+    state.touching[some, :, puck] = False
+
+
+def puck_gap(state: State) -> Array:
+    """(W,) distance of paddle 0 to puck 0, m."""
+    gap = state.puck[:, 0] - state.paddle[:, 0]
+    return np.asarray(np.hypot(gap[:, 0], gap[:, 1]))
+
+
+def roll(
+    position: Array,
+    velocity: Array,
+    times: Array,
+    pull: float,
+    damping: float,
+    half_width: float,
+    restitution: float,
+) -> Array:
+    """Closed form of a puck that slides, falls and banks off the long walls.
+
+    With drag c the lateral way after time t is that of a free puck after
+    u = (1 - exp(-c t)) / c, so that banks come at known u.
+
+    Args:
+        position: (W, 2) m.
+        velocity: (W, 2) m/s.
+        times: (T,) s, ascending.
+        pull: acceleration toward home, m/s2.
+        damping: drag c, 1/s, above 0.
+        half_width: largest |y| of the puck's centre, m.
+        restitution: of the walls.
+
+    Returns:
+        (W, T, 4) x, y, vx, vy.
+    """
+    out = np.empty((len(position), len(times), 4))
+    fade = np.exp(-damping * times)
+    start = np.concatenate([position, velocity], -1)
+    _roll(start, times, fade, pull / damping, damping, half_width, restitution, out)
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _roll(
+    start: Array,
+    times: Array,
+    fade: Array,
+    fall: float,
+    damping: float,
+    half_width: float,
+    restitution: float,
+    out: Array,
+) -> None:
+    """Fill ``out`` (W, T, 4) for ``start`` (W, 4); ``fall`` is the terminal speed."""
+    for w in range(len(start)):
+        x, y, vx, vy = start[w, 0], start[w, 1], start[w, 2], start[w, 3]
+        side = -1.0 if vy < 0.0 else 1.0
+        speed, last, edge = max(abs(vy), 1e-9), 0.0, y
+        bank = (half_width - side * y) / speed
+        for t in range(len(times)):
+            u = (1.0 - fade[t]) / damping
+            while u >= bank and speed > 1e-9:
+                edge, last = side * half_width, bank
+                speed, side = speed * restitution, -side
+                bank += 2.0 * half_width / max(speed, 1e-9)
+            out[w, t, 0] = x + (vx + fall) * u - fall * times[t]
+            out[w, t, 1] = edge + side * speed * (u - last)
+            out[w, t, 2] = (vx + fall) * fade[t] - fall
+            out[w, t, 3] = side * speed * fade[t]
+
+
+def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> Array:
+    """(W, 2) points in a seat's reach, ``margin`` m from its edges, table frame."""
+    polygon = np.asarray(scene.seats[seat].reach)
+    normals, offsets = half_planes(scene.seats[seat].reach)
+    low, high = polygon.min(0) + margin, polygon.max(0) - margin
+
+    def sample(some: RandomStreams) -> Array:
+        return some.uniform(low, high, 2)
+
+    def fits(points: Array) -> Array:
+        return np.asarray((points @ normals.T + offsets >= margin).all(-1))
+
+    ego = redraw(rng, sample, fits)
+    return np.asarray(ego @ scene.table.rotation(scene.seats[seat].side))
+
+
+def redraw(
+    rng: RandomStreams,
+    sample: Callable[[RandomStreams], Array],
+    accept: Callable[[Array], Array],
+) -> Array:
+    """Rows of ``sample``, each drawn again until ``accept`` takes it.
+
+    Raises:
+        RuntimeError: a row that is still refused after 1000 tries.
+    """
+    rows = sample(rng)
+    for _ in range(1000):
+        again = np.flatnonzero(~accept(rows))
+        if not len(again):
+            return rows
+        rows[again] = sample(rng.select(again))
+    raise RuntimeError("start: no acceptable first state in 1000 tries")

@@ -1,0 +1,228 @@
+"""What scripted players of games share: foresight, aiming, and how good they are.
+
+Everything is in the ego frame of a seat, over W worlds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.types import Array
+
+
+class Skill(NamedTuple):
+    """How good a script is."""
+
+    pace: float
+    """Largest share of its top speed that it asks for."""
+    lag: float
+    """s by which it sees pucks late, as if they had moved on evenly."""
+
+
+STRENGTHS = {
+    "weak": Skill(0.3, 0.15),
+    "fair": Skill(0.55, 0.06),
+    "strong": Skill(1.0, 0.0),
+}
+
+
+@dataclass
+class Scripted(Driver):
+    """A scripted player of games, as good as its strength.
+
+    Raises:
+        ValueError: an unknown strength.
+    """
+
+    strength: str = "strong"
+    """In games: "weak", "fair" or "strong"."""
+
+    def __post_init__(self) -> None:
+        if self.strength not in STRENGTHS:
+            raise ValueError(unknown_name("strength", self.strength, STRENGTHS))
+        self._skill = STRENGTHS[self.strength]
+
+    def _paced(self, action: Array, view: View) -> Array:
+        """(W, 2) asked m/s as fractions of top speed, none above its pace."""
+        share = action / view.top_speed[:, None]
+        most = self._skill.pace / np.maximum(length(share), 1e-9)
+        return share * np.minimum(most, 1.0)[:, None]
+
+
+@dataclass(frozen=True)
+class Field:
+    """Where the goals are in the ego frame of a seat."""
+
+    edge: float
+    """x of one's own side, m."""
+    half: float
+    """Half the width of the table for a puck's centre, m; infinite on polygons."""
+    keep: float
+    """Largest |y| of a shot at one's own goal, m."""
+    targets: Array
+    """(T, 2) points in the goals of other teams, m; empty without any."""
+
+    @staticmethod
+    def of(scene: Scene, seat: int) -> Field:
+        """As a seat sees it."""
+        table, me = scene.table, scene.seats[seat]
+        turn = table.rotation(me.side)
+        teams = {s.side: s.team for s in scene.seats}
+        keep, points = np.inf, []
+        for goal_line in scene.goal_lines:
+            if goal_line.width is None:
+                continue
+            if teams.get(goal_line.side) == me.team:
+                keep = goal_line.width / 2
+                continue
+            start, end = table.ends(goal_line.side)
+            along = (end - start) / np.linalg.norm(end - start)
+            spread = max(goal_line.width / 2 - 1.2 * table.puck_radius, 0.0)
+            middle = (start + end) / 2
+            points += [middle + share * spread * along for share in (-1.0, 0.0, 1.0)]
+        box = len(table.vertices) == 4 and me.side in (0, 2)
+        half = float(table.size[1]) / 2 - table.puck_radius if box else np.inf
+        targets = np.array(points).reshape(-1, 2) @ turn.T
+        return Field(-float(table.offsets[me.side]), half, keep, targets)
+
+    def fold(self, y: Array) -> Array:
+        """Where a puck is that would be at ``y`` without the long walls, m."""
+        if not np.isfinite(self.half):
+            return y
+        wide = 4 * self.half
+        return np.asarray(self.half - np.abs((y + self.half) % wide - 2 * self.half))
+
+
+def nearest_puck(view: View, lag: float) -> tuple[Array, Array]:
+    """Place and velocity of the puck to see to: it is near, or soon will be."""
+    place = view.state.puck - lag * view.state.puck_velocity
+    motion = view.state.puck_velocity
+    which = (place[..., 0] + 0.4 * motion[..., 0]).argmin(-1)
+    rows = np.arange(len(which))
+    return place[rows, which], motion[rows, which]
+
+
+def guard(view: View, field: Field, depth: float, lag: float) -> Array:
+    """(W, 2) where to stand: on a line before the goal, where the puck will cross it.
+
+    Args:
+        view: what is seen.
+        field: see `Field`.
+        depth: m of the line from the near edge of the reach.
+        lag: s by which pucks are seen late.
+    """
+    line = view.reach[:, 0].min() + depth
+    place, motion = nearest_puck(view, lag)
+    due = np.clip((place[:, 0] - line) / np.maximum(-motion[:, 0], 0.3), 0.0, 0.6)
+    coming = motion[:, 0] < 0.0
+    wide = min(np.abs(view.reach[:, 1]).max(), field.keep)
+    aside = field.fold(place[:, 1] + np.where(coming, due, 0.0) * motion[:, 1])
+    return np.stack([np.full_like(aside, line), np.clip(aside, -wide, wide)], -1)
+
+
+LOOK, FURTHEST = 0.05, 1.2
+"""s: a puck's way is looked at in such steps, so far ahead."""
+
+
+@njit(cache=True, error_model="numpy")
+def _meeting(
+    place: Array,
+    motion: Array,
+    own: Array,
+    speed: Array,
+    aim: Array,
+    low: Array,
+    high: Array,
+    touch: float,
+    half: float,
+) -> tuple[Array, Array, Array]:
+    """When and where a paddle can first be behind a puck, and the way from there.
+
+    All (W, ...); the time is infinite where it never can, the place then is the puck's.
+    """
+    due, there, way = np.empty(len(own)), np.empty_like(own), np.empty_like(own)
+    for w in range(len(own)):
+        due[w] = np.inf
+        for moment in np.arange(0.0, FURTHEST + 0.5 * LOOK, LOOK):
+            x = place[w, 0] + motion[w, 0] * moment
+            y = place[w, 1] + motion[w, 1] * moment
+            if np.isfinite(half):
+                y = half - abs((y + half) % (4 * half) - 2 * half)
+            ox, oy = aim[w, 0] - x, aim[w, 1] - y
+            size = max(np.sqrt(ox * ox + oy * oy), 1e-6)
+            ox, oy = ox / size, oy / size
+            bx = min(max(x - ox * (touch + 0.03), low[0]), high[0]) - own[w, 0]
+            by = min(max(y - oy * (touch + 0.03), low[1]), high[1]) - own[w, 1]
+            require = np.sqrt(bx * bx + by * by) / max(speed[w], 1e-6)
+            fits = low[0] < x < high[0] + 0.7 * touch and require <= moment + LOOK
+            if fits or moment == 0.0:
+                there[w, 0], there[w, 1], way[w, 0], way[w, 1] = x, y, ox, oy
+            if fits:
+                due[w] = moment
+                break
+    return due, there, way
+
+
+def attack(
+    view: View, field: Field, aim: Array, pace: float, lag: float
+) -> tuple[Array, Array]:
+    """Velocities (W, 2) m/s that strike the puck at a point, and in how many s (W,).
+
+    The time is infinite where the puck cannot be met.
+
+    The puck is met at the first moment at which the paddle can be behind it; until then
+    the paddle waits a little behind, and strikes through the puck when it is due.
+
+    Args:
+        view: what is seen.
+        field: see `Field`.
+        aim: (W, 2) m.
+        pace: largest share of top speed.
+        lag: s by which pucks are seen late.
+    """
+    own, speed = view.state.paddle[:, view.seat], pace * view.top_speed
+    place, motion = nearest_puck(view, lag)
+    bodies = view.state.bodies
+    touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
+    low, high = view.reach.min(0), view.reach.max(0)
+
+    due, there, way = _meeting(
+        place, motion, own, speed, aim, low, high, touch, field.half
+    )
+    contact = there - way * touch
+    gap = contact - own
+    along = (gap * way).sum(-1)
+    aside = gap - along[:, None] * way
+    rest = length(motion) < 0.3
+    ready = (along > -0.01) & (along < 0.2) & (length(aside) < 0.02)
+    strike = np.where(rest, ready, (due < 0.11) & (length(aside) < 0.06))
+    through = way * speed[:, None] + aside * 12.0
+    # Around the puck, not through it, when it lies nearer to home than the paddle.
+    wrong = (own[:, 0] > there[:, 0] - 0.3 * touch) & (due < 0.25)
+    room = np.where(own[:, 1] >= there[:, 1], 1.0, -1.0) * touch * 1.25
+    detour = np.stack([there[:, 0] - 1.2 * touch, there[:, 1] + room], -1)
+    target = np.where(wrong[:, None], np.clip(detour, low, high), contact - way * 0.05)
+    action = np.where(strike[:, None], through, (target - own) * 12.0)
+    return action, due
+
+
+def open_goal(view: View, field: Field) -> Array:
+    """(W, 2) the point in the other goals that fewest paddles are in the way of, m."""
+    if not len(field.targets):
+        return np.broadcast_to(np.array([-field.edge, 0.0]), (len(view.rng), 2))
+    place, _ = nearest_puck(view, 0.0)
+    others = np.delete(view.state.paddle, view.seat, axis=-2)
+    shot = field.targets - place[:, None]
+    size = np.maximum(length(shot), 1e-6)[..., None]
+    gap = others[:, None] - place[:, None, None]
+    along = np.clip((gap * (shot / size)[:, :, None]).sum(-1), 0.0, size)
+    clear = length(gap - along[..., None] * (shot / size)[:, :, None]).min(-1)
+    return np.asarray(field.targets[clear.argmax(-1)])

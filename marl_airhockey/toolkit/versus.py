@@ -1,0 +1,140 @@
+"""What games of two teams with a goal at either end share: score, serves and fouls."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey.contracts.observable import Observable
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables as observables
+from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.types import Array, Memory
+
+
+@dataclass(frozen=True, kw_only=True)
+class Versus(Scenario):
+    """A goal pays a team 1 and costs the other 1; ``goals_to_win`` of them win.
+
+    After a goal the puck is served from the centre toward the team that conceded it.
+    Holding it within reach for ``possession`` seconds is a foul: a serve to the other
+    side. A puck that lies out of everybody's reach is served again.
+    """
+
+    seats: str = "arcade"
+    seconds: float = 60.0
+    goals_to_win: int = 7
+    """Goals."""
+    pucks: int = 1
+    """Pucks in play at once."""
+    goal_width: float = 0.30
+    """m: width of the goal lines."""
+    possession: float = 5.0
+    """s: for so long a team may have a puck in its reach."""
+    jitter_weight: float = 0.0
+
+    @property
+    @abstractmethod
+    def lineup(self) -> tuple[tuple[int, float], ...]:
+        """Of each seat: the side it plays at, 0 or 2, and the y where it starts, m."""
+
+    @cached_property
+    def scene(self) -> Scene:
+        seats = [self.seat(side, (2 - side,), side // 2) for side, _ in self.lineup]
+        goal_lines = (
+            GoalLine("home", 0, self.goal_width),
+            GoalLine("far", 2, self.goal_width),
+        )
+        return Scene(
+            self.table_geometry,
+            tuple(seats),
+            pucks=self.pucks,
+            goal_lines=goal_lines,
+            physics={"tilt": 0.0},
+        )
+
+    @cached_property
+    def teams(self) -> Array:
+        """(seats,) 0 at home, 1 at the far end."""
+        return np.array([seat.team for seat in self.scene.seats])
+
+    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        seats, pucks = len(self.lineup), self.pucks
+        state = starts.first_state(self.scene, worlds)
+        for i, (side, y) in enumerate(self.lineup):
+            state.paddle[:, i] = (0.7 * self.table_geometry.offsets[0] * (side - 1), y)
+        toward = np.where(rng.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
+        for k in range(pucks):
+            starts.serve(rng, state, k, toward + k * np.pi)
+        return state, {
+            **rewards.no_touches(worlds, seats, pucks),
+            "goals": np.zeros((worlds, 2)),
+            "held": np.zeros((worlds, seats, pucks)),
+            "lying": np.zeros((worlds, pucks)),
+            "serve": np.zeros((worlds, pucks)),
+        }
+
+    def update_memory(
+        self, memory: Memory, before: State, command: Array, after: State
+    ) -> Memory:
+        home, far = after.crossed[..., 0], after.crossed[..., 1]
+        held = rewards.held(self.scene, memory["held"], before, after)
+        foul = held >= self.possession - 1e-9
+        lying = rewards.lying(memory["lying"], held, before, after)
+        toward = 1.0 * (far | foul[..., 0, :]) - 1.0 * (home | foul[..., -1, :])
+        again = (toward == 0.0) & (lying >= 1.0 - 1e-9)
+        nearer = np.where(after.puck[..., 0] < 0.0, -1.0, 1.0)
+        serve = np.where(again, nearer, toward)
+        return {
+            "goals": memory["goals"] + after.crossed[..., ::-1].sum(-2),
+            "held": np.where((serve != 0.0)[..., None, :], 0.0, held),
+            "lying": np.where(serve != 0.0, 0.0, lying),
+            "serve": serve,
+        }
+
+    @property
+    def observation(self) -> tuple[Observable, ...]:
+        return (
+            observables.OwnPaddle(),
+            observables.OtherPaddles(),
+            observables.Pucks(),
+            observables.OwnToPucks(),
+            observables.PossessionTime(self.possession),
+        )
+
+    def reward_terms(
+        self, before: State, command: Array, after: State, old: Memory, new: Memory
+    ) -> dict[str, Array]:
+        scored = new["goals"] - old["goals"]
+        return {"goal": (scored - scored[..., ::-1])[..., self.teams]}
+
+    def terminated(self, after: State, memory: Memory) -> Array:
+        return np.asarray((memory["goals"] >= self.goals_to_win).any(-1))
+
+    def restart(
+        self, rng: RandomStreams, after: State, memory: Memory
+    ) -> tuple[Array, State, Memory] | None:
+        worlds = np.flatnonzero(memory["serve"].any(-1))
+        if not len(worlds):
+            return None
+        rows, some = after.map(lambda x: x[worlds]), rng.select(worlds)
+        toward = memory["serve"][worlds]
+        for k in range(self.pucks):
+            heading = np.where(toward[:, k] > 0.0, 0.0, np.pi)
+            starts.serve(some, rows, k, heading, toward[:, k] != 0.0)
+        return worlds, rows, {name: value[worlds] for name, value in memory.items()}
+
+    def caption(self, memory: Memory) -> str:
+        return "goals " + " : ".join(f"{goals:.0f}" for goals in memory["goals"])
+
+    def success(self, after: State, memory: Memory) -> Array:
+        goals = memory["goals"]
+        over = (after.time >= self.seconds - 1e-9)[..., None]
+        won = (goals >= self.goals_to_win) | (over & (goals > goals[..., ::-1]))
+        return np.asarray(won[..., self.teams])

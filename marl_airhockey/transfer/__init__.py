@@ -1,0 +1,1 @@
+"""Other physics: how policies do there, and what it is."""

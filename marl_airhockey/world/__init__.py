@@ -1,0 +1,1 @@
+"""One control step of B worlds, from actions to rewards."""

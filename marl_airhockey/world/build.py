@@ -1,0 +1,131 @@
+"""Build: see the definitions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.physics import Physics, Value
+from marl_airhockey.jit.threads import threads
+from marl_airhockey.registry import find_backend, make_driver, make_scenario
+from marl_airhockey.world.world import World
+
+if TYPE_CHECKING:
+    pass
+
+
+class Keywords(TypedDict, total=False):
+    """What every environment can be built with; see `build_world` for meanings."""
+
+    backend: str
+    drivers: Mapping[str, str | Driver]
+    seats: str
+    profile: str
+    observe: str
+    goals: str
+    physics: Mapping[str, Value]
+    control_dt: float
+    substeps: int
+    max_cycles: int
+    options: Mapping[str, Any]
+
+
+def build_world(
+    scenario: str | Scenario,
+    num_worlds: int,
+    autoreset: bool,
+    keywords: Keywords,
+) -> World:
+    """Build B worlds of a scenario from the keywords that all environments share.
+
+    Args:
+        scenario: name of a file in ``scenarios/``, or a scenario object.
+        num_worlds: B.
+        autoreset: whether worlds begin anew where an episode ended.
+        keywords: all optional.
+            backend: name of the physics ("pymunk").
+            drivers: drivers of seats by agent: names, paths of policies, or objects;
+                the other seats are open.
+            seats: "robot" or "arcade".
+            profile: "ideal" or "robot" (delays, noise, +-15 % on every parameter).
+            observe: "velocity" (in the ideal profile), "history" (in the robot
+                profile) or "pixels".
+            goals: "flat" or "dict".
+            physics: parameters by name, values or (low, high) drawn per episode.
+            control_dt: s between two actions (0.05).
+            substeps: physics steps in one control step (the backend's own).
+            max_cycles: length of an episode in control steps.
+            options: the scenario's own fields.
+
+    Raises:
+        ValueError: an unknown name or a value that makes no sense, named.
+        RuntimeError: a backend that cannot run here, with the fix.
+    """
+    for name in keywords:
+        if name not in Keywords.__annotations__:
+            raise ValueError(
+                unknown_name("keyword", name, Keywords.__annotations__)
+                + "; fields of the scenario go into options={...}"
+            )
+    threads()  # Refused here if it makes no sense, not at the first step.
+    if num_worlds < 1:
+        raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
+    game = find_scenario(scenario, keywords)
+    scene = game.scene
+    name = keywords.get("backend", "pymunk")
+    kind = find_backend(name)
+    reason = kind.supports(scene)
+    if reason:
+        raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
+    control_dt = keywords.get("control_dt", 0.05)
+    substeps = keywords.get("substeps", kind.default_substeps)
+    max_cycles = keywords.get("max_cycles")
+    _check_times(control_dt, substeps, max_cycles)
+    profile = keywords.get("profile", "ideal")
+    given = keywords.get("physics")
+    physics = Physics(scene.defaults, profile, given, arms=not kind.ideal)
+    usual = "history" if profile == "robot" else "velocity"
+    agents = [f"paddle_{i}" for i in range(len(scene.seats))]
+    drivers: dict[int, Driver] = {}
+    for agent, driver in keywords.get("drivers", {}).items():
+        if agent not in agents:
+            raise ValueError(unknown_name("agent", agent, agents))
+        built = make_driver(driver) if isinstance(driver, str) else driver
+        drivers[agents.index(agent)] = built
+    return World(
+        game,
+        kind(scene, num_worlds, control_dt, substeps),
+        drivers,
+        physics,
+        keywords.get("observe", usual),
+        max_cycles,
+        autoreset,
+    )
+
+
+def _check_times(control_dt: float, substeps: int, max_cycles: int | None) -> None:
+    if not 0.001 <= control_dt <= 1.0:
+        raise ValueError(f"control_dt: {control_dt} s must be in 0.001 .. 1")
+    if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
+        raise ValueError(
+            f"substeps: {substeps!r} must be a whole number above 0: control_dt is a "
+            "multiple of the simulation's step"
+        )
+    if max_cycles is not None and max_cycles < 1:
+        raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
+
+
+def find_scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
+    """The scenario that keywords ask for."""
+    options = dict(keywords.get("options", {}))
+    for shared in ("seats", "goals"):
+        if shared in keywords:
+            options[shared] = keywords.get(shared)
+    if isinstance(scenario, str):
+        return make_scenario(scenario, **options)
+    if options:
+        raise ValueError(f"options {sorted(options)}: give them to the scenario object")
+    return scenario

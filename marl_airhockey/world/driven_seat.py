@@ -1,0 +1,125 @@
+"""Seats that are driven inside the environment, each by a driver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.state import State
+from marl_airhockey.types import Array, Memory
+from marl_airhockey.world.delay import ALL, Rows
+from marl_airhockey.world.observer import Observer
+
+
+class Driven:
+    """One driven seat of B worlds: its driver, the driver's memory and pace.
+
+    Raises:
+        ValueError: a driver whose control_dt is no multiple of the environment's.
+    """
+
+    def __init__(
+        self,
+        index: int,
+        driver: Driver,
+        observer: Observer,
+        num_worlds: int,
+        control_dt: float,
+    ) -> None:
+        self.index, self.driver, self._observer = index, driver, observer
+        scene = observer.scenario.scene
+        self._seat = scene.seats[index]
+        self._turn = scene.table.rotation(self._seat.side)
+        own = driver.control_dt or control_dt
+        self.every = round(own / control_dt)
+        if self.every < 1 or abs(self.every * control_dt - own) > 1e-9:
+            raise ValueError(
+                f"driver of paddle_{index}: its control_dt {own} s is not a multiple "
+                f"of the environment's {control_dt} s"
+            )
+        self._layout = observer.prepare(driver.observe or observer.observe)
+        self._num_worlds = num_worlds
+        never = np.zeros(num_worlds, np.int64)
+        self._rng = RandomStreams.keyed(never, never, f"driver {index}")
+        self._held = np.zeros((num_worlds, 2))
+        self._memory: dict[str, Array] = {}
+        driver.__enter__()
+
+    def start(self, worlds: Array, seeds: Array, episodes: Array) -> None:
+        """Begin an episode in some worlds, by index."""
+        self._rng.renew(worlds, seeds, episodes, f"driver {self.index}")
+        self._held[worlds] = 0.0
+        rng = self._rng.select(worlds)
+        rows = self.driver.start(self._seat, rng, len(worlds))
+        for name, row in rows.items():
+            if name not in self._memory:
+                shape = (self._num_worlds, *row.shape[1:])
+                self._memory[name] = np.zeros(shape, row.dtype)
+            self._memory[name][worlds] = row
+
+    def measured(self) -> Array | None:
+        """(B, 4) where the paddle is, if the driver tells it."""
+        return self.driver.measured()
+
+    def act(
+        self,
+        sensed: State,
+        memory: Memory,
+        physics: dict[str, Array],
+        cycles: Array,
+        worlds: Rows = ALL,
+    ) -> Array:
+        """The asked velocity in some worlds, (W, 2) fractions in the ego frame."""
+        due, held = cycles[worlds] % self.every == 0, self._held[worlds]
+        if not due.any():
+            return held
+        if worlds is not ALL:
+            sensed = sensed.map(lambda x: x[worlds])
+            memory = {name: value[worlds] for name, value in memory.items()}
+            physics = {name: value[worlds] for name, value in physics.items()}
+        view = self.view(sensed, memory, physics, worlds)
+        kept = {name: value[worlds] for name, value in self._memory.items()}
+        action, kept = self.driver.act(view, kept)
+        if action.shape != held.shape or not np.isfinite(action).all():
+            raise ValueError(
+                f"driver of paddle_{self.index}: act() must give finite numbers of "
+                f"shape {held.shape}, got {action.shape}"
+            )
+        for name, value in kept.items():
+            self._memory[name][worlds] = value
+        self._held[worlds] = np.where(due[:, None], action, held)
+        return self._held[worlds]
+
+    def view(
+        self,
+        sensed: State,
+        memory: Memory,
+        physics: dict[str, Array],
+        worlds: Rows = ALL,
+    ) -> View:
+        """What the driver sees in some worlds, all arrays being theirs."""
+        seats, want = np.array([self.index]), self.driver.observe
+        shown = self._observer.read(sensed, memory, seats, want, worlds)
+        ego = sensed
+        if self._turn[0, 0] != 1.0:
+            turned = (x @ self._turn.T for x in (sensed.position, sensed.velocity))
+            position, velocity = turned
+            ego = replace(sensed, position=position, velocity=velocity)
+        return View(
+            scene=self._observer.scenario.scene,
+            state=ego,
+            observation=(
+                {k: v[:, 0] for k, v in shown.items()}
+                if isinstance(shown, dict)
+                else np.asarray(shown)[:, 0]
+            ),
+            labels=self._layout.labels,
+            top_speed=physics["paddle_speed"],
+            reach=np.asarray(self._seat.reach),
+            rng=self._rng.select(worlds),
+            seat=self.index,
+            scenario_memory=memory,
+        )

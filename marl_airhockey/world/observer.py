@@ -1,0 +1,150 @@
+"""What seats are shown: layouts of pieces, dicts of goals, or pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from marl_airhockey.contracts.observable import (
+    FRAMES,
+    OBSERVE,
+    EgoView,
+    ObservationContext,
+)
+from marl_airhockey.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.state import State
+from marl_airhockey.jit.fused import Fused, Sink, Source
+from marl_airhockey.types import Array, Memory
+from marl_airhockey.world.delay import ALL, Rows
+from marl_airhockey.world.layout import ObservationLayout
+from marl_airhockey.world.sensor import Sensor
+
+Observation = Array | Mapping[str, Array]
+"""(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
+PIXELS = 84
+
+
+class Observer:
+    """Shows sensed states to seats, in the form that each of them wants.
+
+    Args:
+        scenario: lists the pieces.
+        sensor: keeps the history.
+        physics: tells the top speed.
+        observe: the form for open seats, see `layout.OBSERVE`.
+    """
+
+    def __init__(
+        self, scenario: Scenario, sensor: Sensor, physics: Physics, observe: str
+    ) -> None:
+        self.scenario, self.sensor, self.observe = scenario, sensor, observe
+        self._top_speed = physics.highest("paddle_speed")
+        self._layouts: dict[str, ObservationLayout] = {}
+        self._shows: dict[str, Fused] = {}
+        self.prepare(observe)
+
+    def prepare(self, observe: str) -> ObservationLayout:
+        """The layout of a form; pictures have that of velocities beside them."""
+        if observe not in OBSERVE:
+            raise ValueError(unknown_name("observe", observe, OBSERVE))
+        self.sensor.keeps_history |= observe != "velocity"
+        if observe not in self._layouts:
+            form = "velocity" if observe == "pixels" else observe
+            scope = ObservationContext(self.scenario.scene, form, self._top_speed)
+            apart = self.scenario.goals == "dict"
+            pieces = tuple(
+                p for p in self.scenario.observation if not (apart and p.goal)
+            )
+            self._layouts[observe] = layout = ObservationLayout(pieces, scope)
+            self._shows[observe] = self._compiled(layout)
+        return self._layouts[observe]
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """The layout of the open seats' observations."""
+        return self._layouts[self.observe]
+
+    def read(
+        self,
+        sensed: State,
+        memory: Memory,
+        seats: Array,
+        observe: str | None = None,
+        worlds: Rows = ALL,
+    ) -> Observation:
+        """Observations of some seats, in their order.
+
+        Args:
+            sensed: the sensed state of W worlds, table frame.
+            memory: the scenario's, of these worlds.
+            seats: (n,) indices of seats.
+            observe: the form; None for the open seats'.
+            worlds: which they are, by index.
+        """
+        observe = observe or self.observe
+        if observe == "pixels":
+            return self._pictures(memory, seats, worlds)
+        self.prepare(observe)
+        history = {"history": self.sensor.history[worlds]}
+        (shown,) = self._shows[observe](vars(sensed), memory, history)
+        return self.take(shown, seats)
+
+    def take(self, shown: Sink, seats: Array) -> Observation:
+        """The observations of some seats, of what is shown to all."""
+        if len(seats) != len(self.scenario.scene.seats):
+            shown["flat"] = shown["flat"][:, seats]
+        if len(shown) == 1:
+            return shown["flat"]
+        flat = shown.pop("flat")
+        return {"observation": flat, **shown}
+
+    def show(self, state: State, memory: Memory) -> Sink:
+        """What all seats are shown of a state that is sensed as it is.
+
+        Empty where it takes more than that: a sensor, the past, or a picture.
+        """
+        if self.observe != "velocity" or not self.sensor.ideal:
+            return {}
+        return self._flat(self.layout, state, memory, self.sensor.history)
+
+    def _flat(
+        self, layout: ObservationLayout, state: State, memory: Memory, history: Array
+    ) -> Sink:
+        """What reads a layout, and the goals beside it."""
+        game = self.scenario
+        shown = {"flat": layout.read(EgoView(state, memory, history, layout.scope))}
+        if game.goals == "dict" and isinstance(game, GoalScenario):
+            goals = {
+                "achieved_goal": game.achieved(state, memory),
+                "desired_goal": game.desired(memory),
+            }
+            for name, goal in goals.items():
+                shown[name] = goal[..., None, :].astype(np.float32)
+        return shown
+
+    def _compiled(self, layout: ObservationLayout) -> Fused:
+        """The same as one loop over the worlds."""
+
+        def show(sensed: Source, memory: Memory, sensor: Source) -> tuple[Sink]:
+            return (self._flat(layout, State(**sensed), memory, sensor["history"]),)
+
+        return Fused(show, f"the observation of {self.scenario.name!r}")
+
+    def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
+        from marl_airhockey.world.pixels import small_picture
+
+        scene, frames = self.scenario.scene, self.sensor.frames[worlds]
+        shape = (len(frames), len(seats), PIXELS, PIXELS, FRAMES)
+        out = np.empty(shape, np.uint8)
+        for b, world in enumerate(frames):
+            goal = memory["goal"][b] if "goal" in memory else None
+            for row, seat in enumerate(seats):
+                turn = scene.table.rotation(scene.seats[seat].side)
+                for k in range(FRAMES):
+                    out[b, row, :, :, k] = small_picture(
+                        scene, world[k], goal, turn, int(seat), PIXELS
+                    )
+        return out

@@ -1,0 +1,48 @@
+"""What a seat sees as pixels."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.types import Array
+
+SHIFT = 6
+"""Fractional bits of OpenCV's coordinates."""
+
+
+def small_picture(
+    scene: Scene, position: Array, goal: Array | None, turn: Array, seat: int, size: int
+) -> Array:
+    """What a seat sees as pixels: (size, size) uint8 grey, ego frame.
+
+    Args:
+        scene: who is on the table.
+        position: (N, 2) sensed positions, table frame, m.
+        goal: (2,) wanted place, or None.
+        turn: (2, 2) from the table frame to the seat's ego frame.
+        seat: the seat's index; its own paddle is the brighter one.
+        size: pixels.
+    """
+    image = np.zeros((size, size), np.uint8)
+    corners = np.asarray(scene.table.vertices) @ turn.T
+    extent = float(np.abs(corners).max())
+    scale = (size / 2 - 1) / extent
+
+    def pixel(point: Array) -> tuple[int, int]:
+        x, y = turn @ point * scale
+        return round((size / 2 + x) * 2**SHIFT), round((size / 2 - y) * 2**SHIFT)
+
+    outline = np.array([pixel(np.asarray(c)) for c in scene.table.vertices], np.int32)
+    cv2.fillPoly(image, [outline], 50, cv2.LINE_AA, SHIFT)
+    if goal is not None:
+        wide = round(0.05 * scale * 2**SHIFT)
+        cv2.circle(image, pixel(goal), wide, 110, 1, cv2.LINE_AA, SHIFT)
+    for k, (kind, radius) in enumerate(
+        zip(scene.bodies.kind, scene.bodies.radius, strict=True)
+    ):
+        grey = (140, 255, 90, 70)[kind] + (60 if k == seat else 0)
+        wide = round(radius * scale * 2**SHIFT)
+        cv2.circle(image, pixel(position[k]), wide, grey, -1, cv2.LINE_AA, SHIFT)
+    return image
