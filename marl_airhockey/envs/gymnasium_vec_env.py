@@ -71,7 +71,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
     def _info(result: StepResult) -> dict[str, Any]:
         return {
             "reward": {name: term[:, 0] for name, term in result.terms.items()},
-            "sent": result.sent[:, 0],
+            "applied_action": result.applied_action[:, 0],
             "success": result.success[:, 0],
             "cost": result.cost[:, 0],
         }

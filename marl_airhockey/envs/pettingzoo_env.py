@@ -198,7 +198,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         violation = result.violation[0, self.world.open[i]].tolist()
         return {
             "reward": {k: v.item(i) for k, v in result.terms.items()},
-            "sent": result.sent[0, i],
+            "applied_action": result.applied_action[0, i],
             "success": result.success.item(i),
             "constraints": {name: violation[k] for k, name in CONSTRAINTS},
             "cost": violation[-1],

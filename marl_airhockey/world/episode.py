@@ -22,7 +22,7 @@ class StepResult:
     """(B,) the clock ended it"""
     terms: dict[str, Array]
     """Reward terms by name, (B, open) each"""
-    sent: Array
+    applied_action: Array
     """(B, open, 2) what acted: velocity as a fraction of top speed, ego frame"""
     violation: Array
     """(B, seats, 5) by how much what was asked exceeded the limits, see

@@ -108,7 +108,7 @@ class Referee:
         game, before, after = self._scenario, State(**first), State(**last)
         sent = action["sent"]
         new = game.next_memory(memory, before, sent, after)
-        terms = game.judge(before, sent, after, memory, new)
+        terms = game.all_reward_terms(before, sent, after, memory, new)
         terminated = game.is_terminated(after, new)
         success = game.is_success(after, new)
         if success.ndim == after.time.ndim:

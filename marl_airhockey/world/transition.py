@@ -46,7 +46,7 @@ class Turn:
         self._backend, dt = backend, backend.control_dt
         self._actions = np.zeros((len(limit), len(reach.share), 2))
         self._states = backend.empty_state(), backend.empty_state()
-        self._sent = (Sent.empty_state(self._actions), Sent.empty_state(self._actions))
+        self._sent = (Sent.blank(self._actions), Sent.blank(self._actions))
         self._verdicts = tuple(
             referee.judge(state, self._actions, state, memory, episode, limit)
             for _ in range(2)
@@ -119,7 +119,7 @@ class Turn:
         )
         own = Verdict(verdict.memory, terms, verdict.counters, outcome, shown)
         sent = self._sent[new]
-        return self._states[new], sent._replace(violation=sent.violation.copy()), own
+        return self._states[new], sent._replace(excess=sent.excess.copy()), own
 
     def _load(
         self, state: State, memory: Memory, episode: Episode, pushed: Array

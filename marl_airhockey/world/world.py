@@ -135,7 +135,7 @@ class World:
         return self._episode if self._turn is None else self._episode.copied()
 
     @property
-    def sent(self) -> Array:
+    def command(self) -> Array:
         """(B, seats, 2) what was sent in the last step, table frame, m/s."""
         return self._sent if self._turn is None else self._sent.copy()
 
@@ -245,7 +245,7 @@ class World:
         self._sent, self._pushed = sent.velocity, sent.pushed
         vars(self._episode).update(verdict.counters)
         self._state, self._memory = after, verdict.memory
-        result = self._report(verdict, sent.violation)
+        result = self._report(verdict, sent.excess)
         self._go_on(result, verdict.shown)
         return result
 
@@ -344,7 +344,7 @@ class World:
             terminated=outcome["terminated"],
             truncated=outcome["truncated"],
             terms=terms,
-            sent=sent,
+            applied_action=sent,
             violation=violation,
             cost=cost,
             success=success,
