@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import View
-from marl_airhockey.toolkit import tactics
-from marl_airhockey.types import Array
+from marl_airhockey.toolkit import Array, View, tactics
 
 
 @dataclass

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.types import Array
+from marl_airhockey.toolkit import Array, Driver, View
 
 DEAD = 0.12
 """Share of the stick's way that is taken for rest."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.core.geometry import length
-from marl_airhockey.types import Array
+from marl_airhockey.toolkit import Array, Driver, View, length
 
 
 class Mouse(Driver):

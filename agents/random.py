@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.types import Array
+from marl_airhockey.toolkit import Array, Driver, View
 
 
 class Random(Driver):

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.seat import Seat
-from marl_airhockey.types import Array
+from marl_airhockey.toolkit import Array, Driver, RandomStreams, Seat, View
 
 
 @dataclass
@@ -18,7 +15,7 @@ class Sticky(Driver):
 
     hold: int = 10
 
-    def start(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         return {"held": np.zeros((worlds, 2)), "age": np.zeros(worlds, np.int64)}
 
     def act(

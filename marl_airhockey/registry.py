@@ -17,6 +17,8 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
 
 ZOO = Path(__file__).parent / "zoo"
+DEFAULT_BACKEND = "numba"
+"""Name of the backend that is used unless another is asked for."""
 
 
 def _names(folder: str) -> list[str]:
@@ -32,12 +34,12 @@ def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
 
 
 def scenario_names() -> list[str]:
-    """Names of all scenarios: the files of ``scenarios/``."""
+    """Return the names of all scenarios: the files of ``scenarios/``."""
     return _names("scenarios")
 
 
 def gymnasium_id(name: str) -> str:
-    """The id under which gymnasium knows a scenario, its version included."""
+    """Return the gymnasium id of a scenario, its version included."""
     module = _load("scenario", "scenarios", name, scenario_names())
     camel = "".join(word.capitalize() for word in name.split("_"))
     version = cast(type[Scenario], module.make).version
@@ -45,17 +47,17 @@ def gymnasium_id(name: str) -> str:
 
 
 def agent_names() -> list[str]:
-    """Names of all drivers: the files of ``agents/``."""
+    """Return the names of all drivers: the files of ``agents/``."""
     return _names("agents")
 
 
 def backend_names() -> list[str]:
-    """Names of all backends: the files of ``backends/``."""
+    """Return the names of all backends: the folders of ``backends/``."""
     return _names("backends")
 
 
 def make_scenario(name: str, **options: Any) -> Scenario:
-    """Build what ``scenarios/<name>.py`` makes.
+    """Build the scenario of ``scenarios/<name>.py``.
 
     Raises:
         ValueError: an unknown name or option, or an option that makes no sense.
@@ -66,42 +68,36 @@ def make_scenario(name: str, **options: Any) -> Scenario:
 
 
 def zoo_names() -> list[str]:
-    """Names of the trained policies that come with the library."""
+    """Return the names of the trained policies that come with the library."""
     return sorted(f"zoo/{path.stem}" for path in ZOO.glob("*.npz"))
 
 
-def make_agent(name: str, **options: Any) -> Driver:
-    """Build what ``agents/<name>.py`` makes, or a trained policy: ``zoo/duel``.
+def make_agent(name: str | Path, **options: Any) -> Driver:
+    """Build the driver that a text names.
+
+    Args:
+        name: of a file of ``agents/``, with options behind a colon or not
+            (``allround:strength=fair,depth=0.05``); of a trained policy that comes with
+            the library (``zoo/duel``); or the path of a policy's file or run folder.
+        **options: besides those in the name.
 
     Raises:
-        ValueError: an unknown name or option.
+        ValueError: an unknown name or option, or one that makes no sense.
     """
-    if name.startswith("zoo/"):
-        if name not in zoo_names():
-            raise ValueError(unknown_name("policy of the zoo", name, zoo_names()))
-        return make_agent("policy", path=ZOO / f"{name[4:]}.npz", **options)
-    module = _load("driver", "agents", name, agent_names())
-    known = list(inspect.signature(module.make).parameters)
-    return cast(Driver, _build(f"option of {name}", module.make, options, known))
-
-
-def make_driver(text: str | Path) -> Driver:
-    """A driver by its name, or a policy by the path of its file or run folder.
-
-    Options follow the name: ``allround:strength=fair,depth=0.05``.
-
-    Raises:
-        ValueError: neither the one nor the other, or a bad option.
-    """
-    path, (name, _, options) = Path(text), str(text).partition(":")
-    if name in agent_names() or name.startswith("zoo/"):
-        return make_agent(
-            name, **dict(_option(part) for part in options.split(",") if part)
-        )
+    path, (short, _, given) = Path(name), str(name).partition(":")
+    if short in agent_names() or short.startswith("zoo/"):
+        options = dict(_option(part) for part in given.split(",") if part) | options
+        if short.startswith("zoo/"):
+            if short not in zoo_names():
+                raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
+            short, options["path"] = "policy", ZOO / f"{short[4:]}.npz"
+        module = _load("driver", "agents", short, agent_names())
+        known = list(inspect.signature(module.make).parameters)
+        return cast(Driver, _build(f"option of {short}", module.make, options, known))
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
-        return make_agent("policy", path=path)
+        return make_agent("policy", path=path, **options)
     raise ValueError(
-        unknown_name("driver", text, agent_names()) + "; or the path of a policy"
+        unknown_name("driver", name, agent_names()) + "; or the path of a policy"
     )
 
 
@@ -116,7 +112,7 @@ def _option(part: str) -> tuple[str, str | float]:
 
 
 def find_backend(name: str) -> type[Backend]:
-    """The backend class of ``backends/<name>.py``.
+    """Return the backend class of ``backends/<name>/``.
 
     Raises:
         ValueError: an unknown name.

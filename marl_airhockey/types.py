@@ -1,4 +1,4 @@
-"""Types: see the definitions."""
+"""Types that every room uses."""
 
 from __future__ import annotations
 
@@ -7,7 +7,5 @@ from typing import Any
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-
-
 Memory = dict[str, Array]
-"""What a scenario remembers of an episode: named arrays ``(..., *)``."""
+"""Named arrays ``(..., *)`` that a scenario or a driver keeps of an episode."""

@@ -7,15 +7,21 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.observable import Observable
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.core.table import Table
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    Memory,
+    Observable,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Table,
+    Transition,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,19 +68,25 @@ class FreeForAll(Scenario):
             self.table_geometry, seats, pucks=1, goal_lines=goal_lines, physics=flat
         )
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state, table = starts.first_state(self.scene, worlds), self.table_geometry
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state, table = self.scene.still_state(worlds), self.table_geometry
         state.paddle[:] = -0.7 * table.offsets[0] * table.normals
         first = np.floor(rng.uniform(0.0, self.sides))
         starts.serve(rng, state, 0, self._toward(first))
-        return state, {
-            **rewards.no_touches(worlds, self.sides, 1),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        worlds = len(rng)
+        # The puck is on its way to the side that it was served to.
+        nearing = -state.puck_velocity[:, 0] @ self.table_geometry.normals.T
+        return {
+            **super().initial_memory(state, rng),
             "lives": np.full((worlds, self.sides), float(self.lives)),
             "held": np.zeros((worlds, self.sides, 1)),
             "lying": np.zeros((worlds, 1)),
             "toucher": np.zeros((worlds, 1)),
             "scorer": np.zeros((worlds, 1)),
-            "served": first,
+            "served": 1.0 * nearing.argmax(-1),
             "serve": np.full(worlds, -1.0),
         }
 
@@ -82,31 +94,29 @@ class FreeForAll(Scenario):
         """(W,) headings from the centre to sides, rad."""
         return np.asarray(np.pi + 2.0 * np.pi * side / self.sides)
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        lost = after.crossed[..., 0, :] & (memory["lives"] > 0.0)
-        lives = memory["lives"] - lost
-        held = rewards.held(self.scene, memory["held"], before, after)
-        lying = rewards.lying(memory["lying"], held, before, after)
+    def update_memory(self, t: Transition) -> Memory:
+        lost = t.after.crossed[..., 0, :] & (t.memory["lives"] > 0.0)
+        lives = t.memory["lives"] - lost
+        held = rewards.held(self.scene, t)
+        lying = rewards.lying(t, held)
         foul = (held[..., 0] >= self.possession - 1e-9) & (lives > 0.0)
         dead = (lying[..., 0] >= 1.0 - 1e-9) & ~lost.any(-1)
-        serve = np.full_like(memory["served"], -1.0)
+        serve = np.full_like(t.memory["served"], -1.0)
         for side in range(self.sides):
             follower = self._follower(lives, side)
             heir = np.where(lives[..., side] > 0.0, float(side), follower)
-            again = foul[..., side] | (dead & (memory["served"] == side))
+            again = foul[..., side] | (dead & (t.memory["served"] == side))
             serve = np.where(again, follower, serve)
             serve = np.where(lost[..., side], heir, serve)
         fresh = serve >= 0.0
-        toucher = rewards.last_toucher(memory["toucher"], after)
+        toucher = rewards.last_toucher(t.memory["toucher"], t.after)
         return {
             "lives": lives,
             "held": np.where(fresh[..., None, None], 0.0, held),
             "lying": np.where(fresh[..., None], 0.0, lying),
             "toucher": np.where(fresh[..., None], 0.0, toucher),
             "scorer": toucher,
-            "served": np.where(fresh, serve, memory["served"]),
+            "served": np.where(fresh, serve, t.memory["served"]),
             "serve": serve,
         }
 
@@ -129,27 +139,23 @@ class FreeForAll(Scenario):
             observables.PerSeat("lives", self.lives),
         )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
-        lost = old["lives"] - new["lives"]
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
+        lost = t.memory["lives"] - t.new_memory["lives"]
         own = 1.0 + np.arange(self.sides)
-        scored = (new["scorer"] == own) & (lost.sum(-1, keepdims=True) > 0.0)
+        scored = (t.new_memory["scorer"] == own) & (lost.sum(-1, keepdims=True) > 0.0)
         return {"conceded": -lost, "scored": 1.0 * (scored & (lost == 0.0))}
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return np.asarray((1.0 * (memory["lives"] > 0.0)).sum(-1) <= 1.0)
+    def terminated(self, t: Transition) -> Array:
+        return np.asarray((1.0 * (t.new_memory["lives"] > 0.0)).sum(-1) <= 1.0)
 
-    def restart(
-        self, rng: RandomStreams, after: State, memory: Memory
-    ) -> tuple[Array, State, Memory] | None:
-        worlds = np.flatnonzero(memory["serve"] >= 0.0)
-        if not len(worlds):
-            return None
-        rows = after.map(lambda x: x[worlds])
-        toward = self._toward(memory["serve"][worlds])
-        starts.serve(rng.select(worlds), rows, 0, toward)
-        return worlds, rows, {name: value[worlds] for name, value in memory.items()}
+    def needs_serve(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["serve"] >= 0.0)
+
+    def serve(
+        self, rng: RandomStreams, state: State, memory: Memory
+    ) -> tuple[State, Memory]:
+        starts.serve(rng, state, 0, self._toward(memory["serve"]))
+        return state, memory
 
     def retired(self, memory: Memory) -> Array | None:
         return np.asarray(memory["lives"] <= 0.0)
@@ -157,9 +163,9 @@ class FreeForAll(Scenario):
     def caption(self, memory: Memory) -> str:
         return "lives " + " : ".join(f"{lives:.0f}" for lives in memory["lives"])
 
-    def success(self, after: State, memory: Memory) -> Array:
-        alive = memory["lives"] > 0.0
-        return np.asarray(alive & self.terminated(after, memory)[..., None])
+    def success(self, t: Transition) -> Array:
+        alive = t.new_memory["lives"] > 0.0
+        return np.asarray(alive & self.terminated(t)[..., None])
 
 
 make = FreeForAll

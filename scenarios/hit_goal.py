@@ -7,15 +7,21 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.scenario import GoalScenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    GoalScenario,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,25 +41,27 @@ class HitGoal(GoalScenario):
         seats = (self.seat(),)
         return Scene(self.table_geometry, seats, pucks=1, goal_lines=(home,), path=True)
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
-        return state, {
-            **rewards.no_touches(worlds, 1, 1),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        worlds = len(rng)
+        return {
+            **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
-            "goal": starts.place(rng, (0.05, 0.738), (-0.205, 0.205)),
+            "goal": starts.uniform_box(rng, (0.05, 0.738), (-0.205, 0.205)),
             "near": np.full(worlds, np.inf),
             "entered": np.zeros(worlds, np.bool_),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        goal = memory["goal"]
-        entered, gap, _ = rewards.enters(memory, before, after, goal, self.radius)
+    def update_memory(self, t: Transition) -> Memory:
+        goal = t.memory["goal"]
+        entered, gap, _ = rewards.enters(t, goal, self.radius)
         return {
-            "gap": rewards.nearest(memory, after),
-            "near": np.minimum(memory["near"], gap.min(-1)),
-            "entered": memory["entered"] | entered,
+            "gap": rewards.nearest(t),
+            "near": np.minimum(t.memory["near"], gap.min(-1)),
+            "entered": t.memory["entered"] | entered,
         }
 
     observation = (
@@ -64,21 +72,21 @@ class HitGoal(GoalScenario):
         observables.Goal((0.3, 0.2), 0.31, "puck"),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "aim": 2.0 * rewards.gained(old["near"], new["near"])[..., None],
-            "success": 3.0 * (new["entered"] & ~old["entered"])[..., None],
-            "drop": -1.0 * after.crossed[..., 0, :1],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "aim": 2.0
+            * rewards.gained(t.memory["near"], t.new_memory["near"])[..., None],
+            "success": 3.0
+            * (t.new_memory["entered"] & ~t.memory["entered"])[..., None],
+            "drop": -1.0 * t.after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return memory["entered"] | after.crossed[..., 0, 0]
+    def terminated(self, t: Transition) -> Array:
+        return t.new_memory["entered"] | t.after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return memory["entered"]
+    def success(self, t: Transition) -> Array:
+        return t.new_memory["entered"]
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

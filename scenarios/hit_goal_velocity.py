@@ -7,16 +7,22 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.scenario import GoalScenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.toolkit.shots import legal_shots
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    GoalScenario,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    rewards,
+    starts,
+)
+from marl_airhockey.toolkit.shots import legal_shots, shots_at
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,12 +49,19 @@ class HitGoalVelocity(GoalScenario):
         seats = (self.seat(),)
         return Scene(self.table_geometry, seats, pucks=1, goal_lines=(home,), path=True)
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
         puck, goal = legal_shots(rng, self.scene)
         state.position[:, 1], state.velocity[:, 1] = puck[:, :2], puck[:, 2:]
-        return state, {
-            **rewards.no_touches(worlds, 1, 1),
+        return state, self._memory(state, rng, goal)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        return self._memory(state, rng, shots_at(rng, self.scene, state))
+
+    def _memory(self, state: State, rng: RandomStreams, goal: Array) -> Memory:
+        worlds = len(rng)
+        return {
+            **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
             "goal": goal[:, :2].copy(),
             "goal_velocity": goal[:, 2:].copy(),
@@ -56,16 +69,12 @@ class HitGoalVelocity(GoalScenario):
             "entered": np.zeros(worlds, np.bool_),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
+    def update_memory(self, t: Transition) -> Memory:
         entered, gap, error = rewards.enters(
-            memory,
-            before,
-            after,
-            memory["goal"],
+            t,
+            t.memory["goal"],
             self.radius,
-            memory["goal_velocity"],
+            t.memory["goal_velocity"],
             np.radians(self.angle),
             self.speed_share,
             self.speed_slack,
@@ -73,9 +82,9 @@ class HitGoalVelocity(GoalScenario):
         near = np.exp(-4.0 * np.maximum(gap, 0.0))
         score = (near * (0.3 + 0.7 * np.exp(-1.5 * error))).max(-1)
         return {
-            "gap": rewards.nearest(memory, after),
-            "score": np.maximum(memory["score"], score),
-            "entered": memory["entered"] | entered,
+            "gap": rewards.nearest(t),
+            "score": np.maximum(t.memory["score"], score),
+            "entered": t.memory["entered"] | entered,
         }
 
     observation = (
@@ -87,21 +96,20 @@ class HitGoalVelocity(GoalScenario):
         observables.GoalVelocity(2.5, 0.6),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "score": 3.0 * (new["score"] - old["score"])[..., None],
-            "success": 3.0 * (new["entered"] & ~old["entered"])[..., None],
-            "drop": -1.0 * after.crossed[..., 0, :1],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "score": 3.0 * (t.new_memory["score"] - t.memory["score"])[..., None],
+            "success": 3.0
+            * (t.new_memory["entered"] & ~t.memory["entered"])[..., None],
+            "drop": -1.0 * t.after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return memory["entered"] | after.crossed[..., 0, 0]
+    def terminated(self, t: Transition) -> Array:
+        return t.new_memory["entered"] | t.after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return memory["entered"]
+    def success(self, t: Transition) -> Array:
+        return t.new_memory["entered"]
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

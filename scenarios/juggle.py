@@ -7,14 +7,20 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,18 +45,20 @@ class Juggle(Scenario):
         seats = (self.seat(),)
         return Scene(self.table_geometry, seats, pucks=self.pucks, goal_lines=(home,))
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        return starts.falling(rng, self.scene), {
-            **rewards.no_touches(worlds, 1, self.pucks),
-            **rewards.no_lifts(worlds, self.pucks),
-            "hits": np.zeros(worlds),
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        return {
+            **super().initial_memory(state, rng),
+            **rewards.no_lifts(state),
+            "hits": np.zeros(len(rng)),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        lifts, risen = rewards.lifts(memory, before, after, self.lift)
-        return {**lifts, "hits": memory["hits"] + risen.sum(-1)}
+    def update_memory(self, t: Transition) -> Memory:
+        lifts, risen = rewards.lifts(t, self.lift)
+        return {**lifts, "hits": t.memory["hits"] + risen.sum(-1)}
 
     observation = (
         observables.OwnPaddle(),
@@ -60,19 +68,17 @@ class Juggle(Scenario):
         observables.FromMemory("struck_at", -1.0, 1.0, 1.0, from_own=True),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "hit": (new["hits"] - old["hits"])[..., None],
-            "drop": -2.0 * self.terminated(after, new)[..., None],
+            "hit": (t.new_memory["hits"] - t.memory["hits"])[..., None],
+            "drop": -2.0 * self.terminated(t)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return np.asarray(after.crossed[..., 0].any(-1))
+    def terminated(self, t: Transition) -> Array:
+        return np.asarray(t.after.crossed[..., 0].any(-1))
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return np.asarray(memory["hits"] >= self.hits)
+    def success(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["hits"] >= self.hits)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         armed = memory["struck_at"][memory["armed"] > 0]

@@ -8,14 +8,20 @@ from typing import Literal
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,40 +48,42 @@ class MoveBlock(Scenario):
             goal_lines=(GoalLine("home", 0),),
         )
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
 
         def sample(some: RandomStreams) -> Array:
-            return starts.place(some, (0.05, 0.70), (-0.229, 0.229))
+            return starts.uniform_box(some, (0.05, 0.70), (-0.229, 0.229))
 
         def aside(rows: Array) -> Array:
             # The puck must not fall onto the block.
             return np.asarray(np.abs(rows[:, 1] - state.puck[:, 0, 1]) >= 0.09)
 
         state.block[:, 0] = starts.redraw(rng, sample, aside)
-        return state, {
-            **rewards.no_touches(worlds, 1, 1),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        worlds = len(rng)
+        return {
+            **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
             "origin": state.block[:, 0].copy(),
             "near": np.full(worlds, np.inf),
             "moved": np.zeros(worlds),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        touched, block = rewards.touched(memory), after.block[..., 0, :]
-        fresh = touched & np.isinf(memory["near"])
+    def update_memory(self, t: Transition) -> Memory:
+        touched, block = rewards.touched(t.new_memory), t.after.block[..., 0, :]
+        fresh = touched & np.isinf(t.memory["near"])
         origin = np.where(
-            (fresh | ~touched)[..., None], before.block[..., 0, :], memory["origin"]
+            (fresh | ~touched)[..., None], t.before.block[..., 0, :], t.memory["origin"]
         )
-        near = np.minimum(memory["near"], length(after.puck[..., 0, :] - block))
+        near = np.minimum(t.memory["near"], length(t.after.puck[..., 0, :] - block))
         moved = length(block - origin) * touched
         return {
-            "gap": rewards.nearest(memory, after),
+            "gap": rewards.nearest(t),
             "origin": origin,
             "near": np.where(touched, near, np.inf),
-            "moved": np.maximum(memory["moved"], moved),
+            "moved": np.maximum(t.memory["moved"], moved),
         }
 
     observation = (
@@ -87,22 +95,21 @@ class MoveBlock(Scenario):
         observables.PuckToBlocks(),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "aim": 2.0 * rewards.gained(old["near"], new["near"])[..., None],
-            "moved": 10.0 * (new["moved"] - old["moved"])[..., None],
-            "success": 3.0 * self.success(after, new)[..., None],
-            "drop": -1.0 * after.crossed[..., 0, :1],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "aim": 2.0
+            * rewards.gained(t.memory["near"], t.new_memory["near"])[..., None],
+            "moved": 10.0 * (t.new_memory["moved"] - t.memory["moved"])[..., None],
+            "success": 3.0 * self.success(t)[..., None],
+            "drop": -1.0 * t.after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return self.success(after, memory) | after.crossed[..., 0, 0]
+    def terminated(self, t: Transition) -> Array:
+        return self.success(t) | t.after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return np.asarray(memory["moved"] >= self.way)
+    def success(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["moved"] >= self.way)
 
 
 make = MoveBlock

@@ -7,13 +7,19 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,21 +35,22 @@ class PuckVelocity(Scenario):
         home = GoalLine("home", 0)
         return Scene(self.table_geometry, (self.seat(),), pucks=1, goal_lines=(home,))
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
-        return state, {
-            **rewards.no_touches(worlds, 1, 1),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        return {
+            **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
-            "rise": np.zeros(worlds),
+            "rise": np.zeros(len(rng)),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        rise = after.puck_velocity[..., 0, 0] * rewards.touched(memory)
+    def update_memory(self, t: Transition) -> Memory:
+        rise = t.after.puck_velocity[..., 0, 0] * rewards.touched(t.new_memory)
         return {
-            "gap": rewards.nearest(memory, after),
-            "rise": np.maximum(memory["rise"], rise),
+            "gap": rewards.nearest(t),
+            "rise": np.maximum(t.memory["rise"], rise),
         }
 
     observation = (
@@ -53,21 +60,19 @@ class PuckVelocity(Scenario):
         observables.Touched(),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "rise": (new["rise"] - old["rise"])[..., None],
-            "success": 2.0 * self.success(after, new)[..., None],
-            "drop": -1.0 * after.crossed[..., 0, :1],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "rise": (t.new_memory["rise"] - t.memory["rise"])[..., None],
+            "success": 2.0 * self.success(t)[..., None],
+            "drop": -1.0 * t.after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return self.success(after, memory) | after.crossed[..., 0, 0]
+    def terminated(self, t: Transition) -> Array:
+        return self.success(t) | t.after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return np.asarray(memory["rise"] >= self.fast)
+    def success(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["rise"] >= self.fast)
 
 
 make = PuckVelocity

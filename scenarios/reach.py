@@ -7,15 +7,19 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.scenario import GoalScenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalScenario,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +39,11 @@ class Reach(GoalScenario):
     def scene(self) -> Scene:
         return Scene(self.table_geometry, (self.seat(),))
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         paddle = state.paddle[:, 0]
 
         def sample(some: RandomStreams) -> Array:
@@ -45,42 +52,39 @@ class Reach(GoalScenario):
         goal = starts.redraw(
             rng, sample, lambda rows: length(rows - paddle) >= self.far
         )
-        return state, {
+        return {
+            **super().initial_memory(state, rng),
             "goal": goal,
             "was": paddle.copy(),
             "here": paddle.copy(),
             "gap": length(paddle - goal),
-            "held": np.zeros(worlds, np.int64),
+            "held": np.zeros(len(rng), np.int64),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        here = after.paddle[..., 0, :]
-        gap = length(here - memory["goal"])
+    def update_memory(self, t: Transition) -> Memory:
+        here = t.after.paddle[..., 0, :]
+        gap = length(here - t.memory["goal"])
         return {
-            "was": before.paddle[..., 0, :],
+            "was": t.before.paddle[..., 0, :],
             "here": here,
             "gap": gap,
-            "held": np.where(gap < self.radius, memory["held"] + 1, 0),
+            "held": np.where(gap < self.radius, t.memory["held"] + 1, 0),
         }
 
     observation = (observables.OwnPaddle(), observables.Goal((0.2, 0.2), -0.55, "own"))
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "progress": 2.0 * (old["gap"] - new["gap"])[..., None],
-            "time": np.full((*after.time.shape, 1), -0.02),
-            "success": 2.0 * self.success(after, new)[..., None],
+            "progress": 2.0 * (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "time": np.full((*t.after.time.shape, 1), -0.02),
+            "success": 2.0 * self.success(t)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return self.success(after, memory)
+    def terminated(self, t: Transition) -> Array:
+        return self.success(t)
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return np.asarray(memory["held"] >= 2)
+    def success(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["held"] >= 2)
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

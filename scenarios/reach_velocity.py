@@ -7,16 +7,20 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.scenario import GoalScenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import starts
+from marl_airhockey.toolkit import (
+    Array,
+    GoalScenario,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    starts,
+)
 from marl_airhockey.toolkit.rewards import tolerance
-from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,14 +46,19 @@ class ReachVelocity(GoalScenario):
     def scene(self) -> Scene:
         return Scene(self.table_geometry, (self.seat(),))
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         goal = starts.inside(rng, self.scene, 0, self.margin)
         angle = rng.uniform(-np.pi, np.pi)
         speed = rng.uniform(self.slow, self.fast)[:, None]
         velocity = speed * np.stack([np.cos(angle), np.sin(angle)], -1)
         gap = length(state.paddle[:, 0] - goal)
-        return state, {
+        worlds = len(rng)
+        return {
+            **super().initial_memory(state, rng),
             "goal": goal,
             "goal_velocity": velocity,
             "gap": gap,
@@ -57,15 +66,13 @@ class ReachVelocity(GoalScenario):
             "passed": np.zeros(worlds, np.bool_),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        gap = length(after.paddle[..., 0, :] - memory["goal"])
-        error = length(after.paddle_velocity[..., 0, :] - memory["goal_velocity"])
+    def update_memory(self, t: Transition) -> Memory:
+        gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
+        error = length(t.after.paddle_velocity[..., 0, :] - t.memory["goal_velocity"])
         score = tolerance(gap, 0.0, 0.10) * tolerance(error, 0.0, 0.30)
         return {
-            "gap": np.minimum(memory["gap"], gap),
-            "score": np.maximum(memory["score"], score),
+            "gap": np.minimum(t.memory["gap"], gap),
+            "score": np.maximum(t.memory["score"], score),
             "passed": (gap < self.radius) & (error < self.error),
         }
 
@@ -75,21 +82,19 @@ class ReachVelocity(GoalScenario):
         observables.GoalVelocity(1.0, 0.5),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "progress": (old["gap"] - new["gap"])[..., None],
-            "score": 3.0 * (new["score"] - old["score"])[..., None],
-            "time": np.full((*after.time.shape, 1), -0.02),
-            "success": 2.0 * self.success(after, new)[..., None],
+            "progress": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "score": 3.0 * (t.new_memory["score"] - t.memory["score"])[..., None],
+            "time": np.full((*t.after.time.shape, 1), -0.02),
+            "success": 2.0 * self.success(t)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return self.success(after, memory)
+    def terminated(self, t: Transition) -> Array:
+        return self.success(t)
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return memory["passed"]
+    def success(self, t: Transition) -> Array:
+        return t.new_memory["passed"]
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:

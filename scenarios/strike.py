@@ -7,14 +7,19 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,7 +33,7 @@ class Strike(Scenario):
     seconds: float = 2.0
     fast: float = 1.0
     """m/s: wanted speed of the puck."""
-    way: float = 0.3
+    distance: float = 0.3
     """m: wanted distance from where it lay."""
 
     @cached_property
@@ -36,27 +41,29 @@ class Strike(Scenario):
         flat = {"tilt": 0.0}
         return Scene(self.table_geometry, (self.seat(),), pucks=1, physics=flat)
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state = starts.first_state(self.scene, worlds)
-        state.position[:, 0] = starts.place(rng, (-0.74, -0.64), starts.PADDLE_Y)
-        state.position[:, 1] = starts.place(rng, (-0.49, -0.32), (-0.20, 0.20))
-        return state, {
-            **rewards.no_touches(worlds, 1, 1),
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = self.scene.still_state(worlds)
+        state.position[:, 0] = starts.uniform_box(rng, (-0.74, -0.64), starts.PADDLE_Y)
+        state.position[:, 1] = starts.uniform_box(rng, (-0.49, -0.32), (-0.20, 0.20))
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        worlds = len(rng)
+        return {
+            **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
             "origin": state.puck[:, 0].copy(),
             "speed": np.zeros(worlds),
             "struck": np.zeros(worlds, np.bool_),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        speed = length(after.puck_velocity[..., 0, :])
-        away = length(after.puck[..., 0, :] - memory["origin"]) >= self.way
+    def update_memory(self, t: Transition) -> Memory:
+        speed = length(t.after.puck_velocity[..., 0, :])
+        away = length(t.after.puck[..., 0, :] - t.memory["origin"]) >= self.distance
         return {
-            "gap": rewards.nearest(memory, after),
-            "speed": np.maximum(memory["speed"], speed),
-            "struck": memory["struck"] | (away & (speed >= self.fast)),
+            "gap": rewards.nearest(t),
+            "speed": np.maximum(t.memory["speed"], speed),
+            "struck": t.memory["struck"] | (away & (speed >= self.fast)),
         }
 
     observation = (
@@ -66,21 +73,19 @@ class Strike(Scenario):
         observables.Touched(),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "speed": (new["speed"] - old["speed"])[..., None],
-            "time": np.full((*after.time.shape, 1), -0.01),
-            "success": 2.0 * (new["struck"] & ~old["struck"])[..., None],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "speed": (t.new_memory["speed"] - t.memory["speed"])[..., None],
+            "time": np.full((*t.after.time.shape, 1), -0.01),
+            "success": 2.0 * (t.new_memory["struck"] & ~t.memory["struck"])[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return memory["struck"]
+    def terminated(self, t: Transition) -> Array:
+        return t.new_memory["struck"]
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return memory["struck"]
+    def success(self, t: Transition) -> Array:
+        return t.new_memory["struck"]
 
 
 make = Strike

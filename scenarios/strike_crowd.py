@@ -8,14 +8,19 @@ from typing import Literal
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    rewards,
+    starts,
+)
 
 ROWS = 5
 GAP = 0.004
@@ -47,10 +52,10 @@ class StrikeCrowd(Scenario):
             physics={"tilt": 0.0, "block_friction": 0.5},
         )
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state = starts.first_state(self.scene, worlds)
-        state.position[:, 0] = starts.place(rng, (-0.74, -0.64), starts.PADDLE_Y)
-        state.position[:, 1] = starts.place(rng, (-0.49, -0.32), (-0.10, 0.10))
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = self.scene.still_state(worlds)
+        state.position[:, 0] = starts.uniform_box(rng, (-0.74, -0.64), starts.PADDLE_Y)
+        state.position[:, 1] = starts.uniform_box(rng, (-0.49, -0.32), (-0.10, 0.10))
         pitch = 2 * self.scene.block_radius + GAP
         lift = 0.87 * pitch if self.shape == "disc" else pitch
         triangle = np.array(
@@ -63,23 +68,25 @@ class StrikeCrowd(Scenario):
         middle = rng.uniform(-0.10, 0.10)
         state.block[:] = triangle
         state.block[..., 1] += middle[:, None]
-        return state, {
-            **rewards.no_touches(worlds, 1, 1),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        worlds = len(rng)
+        return {
+            **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
             "origin": state.block.copy(),
             "spread": np.zeros(worlds),
             "rise": np.zeros(worlds),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        spread = length(after.block - memory["origin"]).sum(-1)
-        rise = after.puck_velocity[..., 0, 0] * rewards.touched(memory)
+    def update_memory(self, t: Transition) -> Memory:
+        spread = length(t.after.block - t.memory["origin"]).sum(-1)
+        rise = t.after.puck_velocity[..., 0, 0] * rewards.touched(t.new_memory)
         return {
-            "gap": rewards.nearest(memory, after),
-            "spread": np.maximum(memory["spread"], spread),
-            "rise": np.maximum(memory["rise"], rise),
+            "gap": rewards.nearest(t),
+            "spread": np.maximum(t.memory["spread"], spread),
+            "rise": np.maximum(t.memory["rise"], rise),
         }
 
     observation = (
@@ -90,22 +97,20 @@ class StrikeCrowd(Scenario):
         observables.Blocks(0.35),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "rise": 0.5 * (new["rise"] - old["rise"])[..., None],
-            "spread": 4.0 * (new["spread"] - old["spread"])[..., None],
-            "time": np.full((*after.time.shape, 1), -0.01),
-            "success": 3.0 * self.success(after, new)[..., None],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "rise": 0.5 * (t.new_memory["rise"] - t.memory["rise"])[..., None],
+            "spread": 4.0 * (t.new_memory["spread"] - t.memory["spread"])[..., None],
+            "time": np.full((*t.after.time.shape, 1), -0.01),
+            "success": 3.0 * self.success(t)[..., None],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return self.success(after, memory)
+    def terminated(self, t: Transition) -> Array:
+        return self.success(t)
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return np.asarray(memory["spread"] >= self.spread)
+    def success(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["spread"] >= self.spread)
 
 
 make = StrikeCrowd

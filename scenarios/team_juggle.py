@@ -7,16 +7,22 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.geometry import clip
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.seat import Seat
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    Seat,
+    State,
+    Transition,
+    clip,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,29 +55,31 @@ class TeamJuggle(Scenario):
         half = clip(np.asarray(seat.reach), normal, -self.gap / 2)
         return replace(seat, reach=tuple((float(x), float(y)) for x, y in half))
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
         state.paddle[:] = [(-0.65, 0.15), (-0.65, -0.15)]
-        return state, {
-            **rewards.no_touches(worlds, 2, self.pucks),
-            **rewards.no_lifts(worlds, self.pucks),
-            "striker": np.zeros((worlds, self.pucks)),
-            "passer": np.zeros((worlds, self.pucks)),
-            "passes": np.zeros(worlds),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        nobody = np.zeros((len(rng), self.pucks))
+        return {
+            **super().initial_memory(state, rng),
+            **rewards.no_lifts(state),
+            "striker": nobody,
+            "passer": nobody.copy(),
+            "passes": np.zeros(len(rng)),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        lifts, risen = rewards.lifts(memory, before, after, self.lift)
-        striker = rewards.last_toucher(memory["striker"], after)
-        passer = memory["passer"]
+    def update_memory(self, t: Transition) -> Memory:
+        lifts, risen = rewards.lifts(t, self.lift)
+        striker = rewards.last_toucher(t.memory["striker"], t.after)
+        passer = t.memory["passer"]
         passed = risen & (passer > 0) & (passer != striker)
         return {
             **lifts,
             "striker": striker,
             "passer": np.where(risen, striker, passer),
-            "passes": memory["passes"] + passed.sum(-1),
+            "passes": t.memory["passes"] + passed.sum(-1),
         }
 
     observation = (
@@ -85,20 +93,18 @@ class TeamJuggle(Scenario):
         observables.IsThisSeat("passer"),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
-        passed = new["passes"] - old["passes"]
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
+        passed = t.new_memory["passes"] - t.memory["passes"]
         return {"pass": passed[..., None] * np.ones(2)}
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return np.asarray(after.crossed[..., 0].any(-1))
+    def terminated(self, t: Transition) -> Array:
+        return np.asarray(t.after.crossed[..., 0].any(-1))
 
     def caption(self, memory: Memory) -> str:
         return f"passes {memory['passes']:.0f}"
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return np.asarray(memory["passes"] >= self.passes)
+    def success(self, t: Transition) -> Array:
+        return np.asarray(t.new_memory["passes"] >= self.passes)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         armed = memory["struck_at"][memory["armed"] > 0]

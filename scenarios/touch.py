@@ -5,13 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.toolkit import (
+    Array,
+    GoalLine,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    observables,
+    rewards,
+    starts,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,15 +34,16 @@ class Touch(Scenario):
         home = GoalLine("home", 0)
         return Scene(self.table_geometry, (self.seat(),), pucks=1, goal_lines=(home,))
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
-        memory = rewards.no_touches(worlds, 1, 1)
-        return state, {**memory, "gap": starts.puck_gap(state)}
+        return state, self.initial_memory(state, rng)
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        return {"gap": rewards.nearest(memory, after)}
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        touches = super().initial_memory(state, rng)
+        return {**touches, "gap": starts.puck_gap(state)}
+
+    def update_memory(self, t: Transition) -> Memory:
+        return {"gap": rewards.nearest(t)}
 
     observation = (
         observables.OwnPaddle(),
@@ -45,20 +52,18 @@ class Touch(Scenario):
         observables.Touched(),
     )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
         return {
-            "approach": (old["gap"] - new["gap"])[..., None],
-            "touch": 1.0 * (new["touches"] - old["touches"]).sum(-1),
-            "drop": -1.0 * after.crossed[..., 0, :1],
+            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "touch": 1.0 * (t.new_memory["touches"] - t.memory["touches"]).sum(-1),
+            "drop": -1.0 * t.after.crossed[..., 0, :1],
         }
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return after.crossed[..., 0, 0]
+    def terminated(self, t: Transition) -> Array:
+        return t.after.crossed[..., 0, 0]
 
-    def success(self, after: State, memory: Memory) -> Array:
-        return rewards.touched(memory)
+    def success(self, t: Transition) -> Array:
+        return rewards.touched(t.new_memory)
 
 
 make = Touch

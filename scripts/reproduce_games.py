@@ -29,7 +29,7 @@ from marl_airhockey.evaluation.games import challenge
 from marl_airhockey.evaluation.stats import bootstrap, interval
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
@@ -64,7 +64,7 @@ def versus(game: str, folders: Sequence[Path]) -> Table:
     table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
     columns = []
     for folder in folders:
-        rivals: list[Driver] = [make_driver(name) for name in (*SEEN, *UNSEEN)]
+        rivals: list[Driver] = [make_agent(name) for name in (*SEEN, *UNSEEN)]
         rivals.append(load_policy(milestone(folder, 0.1)))
         policy = load_policy(folder / "last.zip")
         score, _ = challenge(game, policy, rivals, GAMES, SEED, BATCHED)
@@ -104,7 +104,7 @@ def together(game: str, folders: Sequence[Path]) -> Table:
     if mixed:
         add("two seeds", mixed)
     for script in ("striker", "allround"):
-        add(f"two of {script}", [(make_driver(script), make_driver(script))])
+        add(f"two of {script}", [(make_agent(script), make_agent(script))])
     return table
 
 

@@ -29,7 +29,7 @@ from ray.tune.registry import register_env
 import marl_airhockey as ah
 from marl_airhockey.evaluation.games import challenge
 from marl_airhockey.learn.rllib import start_ray
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import Policy
 
 
@@ -94,7 +94,7 @@ def main(
     checkpoint = Path(tempfile.mkdtemp(prefix="duel-"))
     algorithm.save_to_path(str(checkpoint))
     algorithm.stop()
-    rivals = [make_driver("random")]
+    rivals = [make_agent("random")]
     score, _ = challenge(
         "duel", reload(checkpoint, "p0"), rivals, games, 0, {"backend": "numba"}
     )

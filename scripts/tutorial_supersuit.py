@@ -22,7 +22,7 @@ from stable_baselines3 import PPO
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.games import challenge
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import Policy
 
 
@@ -63,7 +63,7 @@ def main(
     def predict(observation: Any, mean: bool) -> Any:
         return np.asarray(model.predict(observation, deterministic=mean)[0])
 
-    rivals = [make_driver("random")]
+    rivals = [make_agent("random")]
     score, margin = challenge(
         "duel", Policy(predict), rivals, games, 0, {"backend": "numba"}
     )

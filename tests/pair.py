@@ -8,10 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.toolkit import (
+    GoalLine,
+    Scenario,
+    Scene,
+    observables,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,19 +31,22 @@ class Pair(Scenario):
             self.table_geometry, seats, pucks=1, goal_lines=goal_lines, physics=flat
         )
 
-    def serve(self, rng, worlds):
-        state = starts.first_state(self.scene, worlds)
+    def place(self, rng, worlds):
+        state = self.scene.still_state(worlds)
         state.position[:, 0], state.position[:, 1] = (-0.5, 0.0), (0.5, 0.0)
         state.velocity[:, 2] = rng.uniform(-0.5, 0.5, 2)
         return state
 
-    def start(self, rng, worlds):
-        memory = rewards.no_touches(worlds, 2, 1) | {"goals": np.zeros((worlds, 2))}
-        return self.serve(rng, worlds), memory
+    def reset(self, rng, worlds):
+        state = self.place(rng, worlds)
+        return state, self.initial_memory(state, rng)
 
-    def update_memory(self, memory, before, command, after):
-        scored = after.crossed[..., 0, ::-1]
-        return {"goals": memory["goals"] + scored}
+    def initial_memory(self, state, rng):
+        return super().initial_memory(state, rng) | {"goals": np.zeros((len(rng), 2))}
+
+    def update_memory(self, t):
+        scored = t.after.crossed[..., 0, ::-1]
+        return {"goals": t.memory["goals"] + scored}
 
     observation = (
         observables.OwnPaddle(),
@@ -50,23 +55,23 @@ class Pair(Scenario):
         observables.OwnToPucks(),
     )
 
-    def reward_terms(self, before, command, after, old, new):
-        scored = new["goals"] - old["goals"]
+    def reward_terms(self, t):
+        scored = t.new_memory["goals"] - t.memory["goals"]
         return {"goal": scored - scored[..., ::-1]}
 
-    def restart(self, rng, after, memory):
-        worlds = np.flatnonzero(after.crossed[..., 0, :].any(-1))
-        if not len(worlds):
-            return None
-        state = self.serve(rng.select(worlds), len(worlds))
-        state.time[:] = after.time[worlds]
-        # Paddles play on where they are.
-        state.paddle[:] = after.paddle[worlds]
-        state.paddle_velocity[:] = after.paddle_velocity[worlds]
-        return worlds, state, {k: v[worlds] for k, v in memory.items()}
+    def needs_serve(self, t):
+        return t.after.crossed[..., 0, :].any(-1)
 
-    def success(self, after, memory):
-        return memory["goals"] >= 3
+    def serve(self, rng, state, memory):
+        new = self.place(rng, len(rng))
+        new.time[:] = state.time
+        # Paddles play on where they are.
+        new.paddle[:] = state.paddle
+        new.paddle_velocity[:] = state.paddle_velocity
+        return new, memory
+
+    def success(self, t):
+        return t.new_memory["goals"] >= 3
 
 
 make = Pair

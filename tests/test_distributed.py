@@ -18,7 +18,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.export import export
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 
 ray = pytest.importorskip("ray", reason="Ray has an environment of its own")
 
@@ -44,7 +44,7 @@ def test_it_learns_and_its_policy_drives_without_ray(tmp_path):
     assert row["steps"] == 98_304
     assert [int(r["steps"]) for r in rows(folder)] == [49_152, 98_304]
     still = evaluate(ah.make_agent("still"), "still", "touch", 200)
-    learned = evaluate(make_driver(str(folder)), "learned", "touch", 200)
+    learned = evaluate(make_agent(str(folder)), "learned", "touch", 200)
     assert learned.success > still.success + 0.3
     code = (
         "import sys, marl_airhockey as ah\n"

@@ -6,7 +6,7 @@ from pair import Pair
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 
 
 def play(scenario, agent, worlds, steps, seed, **keywords):
@@ -138,8 +138,8 @@ def test_a_stronger_opponent_plays_better(script):
 
 def test_options_of_a_driver_are_named_when_they_are_wrong():
     with pytest.raises(ValueError, match="unknown strength 'strog'"):
-        make_driver("striker:strength=strog")
+        make_agent("striker:strength=strog")
     with pytest.raises(ValueError, match="expected NAME=VALUE"):
-        make_driver("striker:weak")
+        make_agent("striker:weak")
     with pytest.raises(ValueError, match="power"):
-        make_driver("striker:power=weak")
+        make_agent("striker:power=weak")

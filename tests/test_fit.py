@@ -7,7 +7,7 @@ from marl_airhockey.core.physics import load_physics
 from marl_airhockey.play.live_match import RATE, Court
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.session import Session
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.transfer.system_id import FITTED, fit, play, recorded
 
 pytest.importorskip("scipy")
@@ -21,7 +21,7 @@ OTHER = {
 
 def test_the_physics_of_another_table_are_found(tmp_path):
     table = {"backend": "pymunk", "physics": OTHER}
-    seen = play("juggle", make_driver("zoo/juggle"), 1500, 0, table)
+    seen = play("juggle", make_agent("zoo/juggle"), 1500, 0, table)
     found = fit(seen)
     for name in FITTED:
         assert found.physics[name] == pytest.approx(OTHER[name], rel=0.12), name
@@ -38,7 +38,7 @@ def test_the_physics_of_another_table_are_found(tmp_path):
 def test_an_arm_is_nearer_to_the_fitted_table():
     pytest.importorskip("robosuite")
     there = {"backend": "robosuite", "physics": OTHER}
-    seen = play("juggle", make_driver("zoo/juggle"), 1000, 0, there)
+    seen = play("juggle", make_agent("zoo/juggle"), 1000, 0, there)
     found = fit(seen)
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.2)
     assert found.closed > 0.5
@@ -62,15 +62,15 @@ def test_recordings_are_fitted_to(tmp_path):
     found = fit(seen)
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.1)
     with pytest.raises(ValueError, match="too few"):
-        fit(play("juggle", make_driver("striker"), 100, 0, {}))
+        fit(play("juggle", make_agent("striker"), 100, 0, {}))
     with pytest.raises(ValueError, match="blocks"):
-        fit(play("move_block", make_driver("striker"), 10, 0, {}))
+        fit(play("move_block", make_agent("striker"), 10, 0, {}))
 
 
 def test_a_puck_that_is_served_is_not_fitted_to():
     drivers = {"paddle_1": "still"}
     options = {"drivers": drivers, "options": {"seats": "arcade"}}
-    seen = play("duel", make_driver("striker"), 1500, 0, options)
+    seen = play("duel", make_agent("striker"), 1500, 0, options)
     way = np.hypot(*np.diff(seen.position[:, 2], axis=0).T)
     served = np.flatnonzero(way > 0.4) + 1
     assert len(served) > 2

@@ -20,7 +20,7 @@ from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.sb3 import build
 from marl_airhockey.learn.self_play import environment
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.roster import Roster
@@ -35,7 +35,7 @@ def test_a_roster_plays_as_drivers_inside_do():
     two = ah.make_world("duel", 6, backend="numba")
     roster = Roster(two)
     for name in names:
-        roster.add(name, make_driver(name))
+        roster.add(name, make_agent(name))
     roster.seated[:] = [0, 1]
     one.autoreset = two.autoreset = False
     one.reset(3)
@@ -52,7 +52,7 @@ def test_a_roster_plays_as_drivers_inside_do():
 def test_who_sits_where_differs_by_world():
     world = ah.make_world("duel", 4, backend="numba")
     roster = Roster(world)
-    still, random = (roster.add(n, make_driver(n)) for n in ("still", "random"))
+    still, random = (roster.add(n, make_agent(n)) for n in ("still", "random"))
     roster.seated[:] = [[still, random], [random, still], [-1, random], [-1, -1]]
     world.reset(0)
     roster.begin(np.arange(4))
@@ -66,7 +66,7 @@ def test_who_sits_where_differs_by_world():
 
 
 def test_games_have_a_winner_or_none_and_ends_do_not_matter():
-    players = [make_driver("allround"), make_driver("random")]
+    players = [make_agent("allround"), make_agent("random")]
     lineups = np.array([[0, 1]] * 20 + [[1, 0]] * 20)
     found = play("duel", players, lineups, 0, {"backend": "numba"})
     np.testing.assert_allclose(found.score.sum(-1), 1.0)
@@ -84,7 +84,7 @@ def test_games_have_a_winner_or_none_and_ends_do_not_matter():
 
 def test_a_league_rates_and_names_its_files(tmp_path):
     names = ("random", "allround", "striker:strength=weak", "still")
-    players = {name: make_driver(name) for name in names}
+    players = {name: make_agent(name) for name in names}
     standings = league("duel", players, 20, keywords=SHORT)
     off = ~np.eye(4, dtype=bool)
     np.testing.assert_allclose((standings.score + standings.score.T)[off], 1.0)
@@ -102,7 +102,7 @@ def test_a_league_rates_and_names_its_files(tmp_path):
 
 
 def test_a_circle_is_named():
-    standings = league("duel", {n: make_driver(n) for n in ("still", "random")}, 2)
+    standings = league("duel", {n: make_agent(n) for n in ("still", "random")}, 2)
     wins = np.array([[0, 90, 5], [5, 0, 90], [90, 5, 0]])
     three = type(standings)(
         "duel", ("a", "b", "c"), 100, wins, np.full((3, 3), 5), *np.zeros((3, 3, 3))
@@ -205,7 +205,7 @@ def test_a_frozen_policy_is_one_small_file(tmp_path):
     model = build(config, env, Rate(config, 1e-3))
     freeze(model, {"scenario": "reach"}).save(tmp_path / "policy.npz")
     assert (tmp_path / "policy.npz").stat().st_size < 300_000
-    driver = make_driver(tmp_path / "policy.npz")
+    driver = make_agent(tmp_path / "policy.npz")
     seen = env.reset()
     mean = model.predict(seen, deterministic=True)[0]
     np.testing.assert_allclose(

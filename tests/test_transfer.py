@@ -7,7 +7,7 @@ import pytest
 from marl_airhockey.cli.main import app
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.transfer.measure import measure, picture, tuned
 
 SMALL = {
@@ -23,7 +23,7 @@ SMALL = {
 def test_success_is_measured_in_all_physics(tmp_path):
     pytest.importorskip("robosuite")
     backends = ["numba", "pymunk", "robosuite"]
-    policies = {"zoo": make_driver("zoo/reach"), "nothing": make_driver("still")}
+    policies = {"zoo": make_agent("zoo/reach"), "nothing": make_agent("still")}
     rows = measure(policies, "reach", backends, ["ideal"], episodes=20)
     assert [row.backend for row in rows] == backends * 2
     assert min(row.success for row in rows[:3]) > 0.8

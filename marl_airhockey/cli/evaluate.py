@@ -25,7 +25,7 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.evaluation.evaluate import TEST_SEED, Result, evaluate
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import Policy
 
 FLOORS = ("still", "random", "sticky")
@@ -50,13 +50,13 @@ def evaluate_driver(
     keywords = environment(backend, profile, option, other, physics)
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
-    seated = make_driver(driver)
+    seated = make_agent(driver)
     entries = [(driver, seated)]
     if isinstance(seated, Policy):
         sampled = replace(seated, deterministic=False)
         entries.append((f"{driver} (sampled)", sampled))
     if floors:
-        entries += [(f, make_driver(f)) for f in FLOORS if f != driver]
+        entries += [(f, make_agent(f)) for f in FLOORS if f != driver]
     results: list[Result] = []
     with bar() as progress:
         task = progress.add_task(scenario, total=len(entries), note="")

@@ -22,7 +22,7 @@ from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.league import found_in
 from marl_airhockey.evaluation.league import league as play_league
 from marl_airhockey.evaluation.standings import Standings
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 
 SCRIPTS = (
     "random",
@@ -64,7 +64,7 @@ def league(
     names = list(players or ([] if folder else SCRIPTS))
     names += found_in(folder) if folder else []
     keywords = environment(backend, profile, option, None)
-    entrants = {label(name, names): make_driver(name) for name in names}
+    entrants = {label(name, names): make_agent(name) for name in names}
     standings = play_league(scenario, entrants, games, keywords=keywords)
     files = standings.save(out)
     responses: dict[str, list[float]] = {}

@@ -22,7 +22,7 @@ from marl_airhockey.cli.options import (
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.physics import PARAMETERS, PROFILES, load_physics
-from marl_airhockey.registry import find_backend, make_driver, make_scenario
+from marl_airhockey.registry import find_backend, make_agent, make_scenario
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def transfer(
             raise ValueError(unknown_name("profile", kind, PROFILES))
     make_scenario(scenario, **settings(option))
     for name in policy or []:
-        make_driver(name)
+        make_agent(name)
     names = list(policy or [])
     if not names:
         for kind in PROFILES:
@@ -85,7 +85,7 @@ def transfer(
     policies: dict[str, Driver] = {}
     for name in names:
         short = Path(name).name if Path(name).exists() else name
-        policies[name if short in policies else short] = make_driver(name)
+        policies[name if short in policies else short] = make_agent(name)
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)
         task = progress.add_task("measuring", total=total, note="")
@@ -157,7 +157,7 @@ def fit(
     if recordings is not None:
         seen = recorded(sorted(recordings.glob("*.jsonl")))
     else:
-        who = make_driver(driver or f"zoo/{scenario}")
+        who = make_agent(driver or f"zoo/{scenario}")
         there = load_physics(physics) if physics else {}
         with console.status(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}

@@ -17,7 +17,7 @@ from marl_airhockey.cli.options import (
     console,
     environment,
 )
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 
 
 @app.command()
@@ -61,7 +61,7 @@ def watch(
     if not scenario:
         raise ValueError("--scenario: say what the driver is to play")
     keywords = environment(backend, profile, option, other)
-    player = make_driver(driver)
+    player = make_agent(driver)
     film(scenario, player, keywords, seed, episodes, video, camera=camera)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

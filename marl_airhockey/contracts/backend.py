@@ -1,43 +1,50 @@
-"""The backend contract: paddle commands in, the next state out; B worlds at a time."""
+"""Backend contract: paddle commands in, the next state out; B worlds at a time."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import RESULTS, State, still_state
-from marl_airhockey.jit.pipeline import NotCompilable, Stage
+from marl_airhockey.core.state import RESULTS, State
+from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
-
-if TYPE_CHECKING:
-    from marl_airhockey.contracts.mark import Mark
 
 MAX_PRESCRIBED_SPEED = 5.0
 """m/s: a prescribed paddle that must be faster than this is lifted, without contact."""
 
 
-@dataclass(frozen=True)
-class Command:
-    """What the paddles do in a step, table frame."""
+class Command(NamedTuple):
+    """Motion of the paddles in a step, table frame; the arrays stay, step by step."""
 
     velocity: Array
-    """(B, seats, 2) m/s to be reached at the end of the step by a linear ramp"""
-    prescribed: Array | None = None
-    """(B, seats, 4) position and velocity at the end of the step, nan where a seat
-    asks; None if all do"""
-    closed: Array | None = None
-    """(B, goal_lines) goal lines that are wall in this step; None if none is"""
+    """(B, seats, 2) m/s, reached at the end of the step by a linear ramp"""
+    prescribed: Array
+    """(B, seats, 4) position and velocity at the end of the step, m and m/s, of paddles
+    that are moved from outside; nan for all others"""
+    closed: Array
+    """(B, goal_lines) bool: wall in this step"""
+
+    @staticmethod
+    def still(scene: Scene, worlds: int) -> Command:
+        """Return a command to rest, freshly allocated."""
+        seats = len(scene.seats)
+        return Command(
+            np.zeros((worlds, seats, 2)),
+            np.full((worlds, seats, 4), np.nan),
+            np.zeros((worlds, len(scene.goal_lines)), np.bool_),
+        )
 
 
 class Backend(ABC):
     """Physics of B worlds with one scene.
 
-    Paddles track their command and are not pushed back by a puck.
+    Paddles track their command and are not pushed back by a puck. A backend can be
+    copied and pickled at any moment; the copy goes on by itself.
 
     Args:
         scene: who is on the table.
@@ -49,7 +56,7 @@ class Backend(ABC):
     exact: ClassVar[bool]
     """True if row i does not depend on the number of worlds, to the bit."""
     ideal: ClassVar[bool] = True
-    """True if paddles move exactly as they are prescribed and contacts take no time."""
+    """True if paddles move exactly as commanded and contacts take no time."""
     realtime: ClassVar[bool] = False
     """True if a step takes as long as it lasts."""
     default_substeps: ClassVar[int]
@@ -61,89 +68,65 @@ class Backend(ABC):
     ) -> None:
         self.scene, self.num_worlds = scene, num_worlds
         self.control_dt, self.substeps = control_dt, substeps
-        self.rest_state = still_state(scene.bodies, num_worlds, len(scene.goal_lines))
-        """All at rest. States share its arrays of what they have nothing to say about;
-        nobody writes to them."""
-        self._nobody = np.zeros((num_worlds, scene.bodies.paddles), np.bool_)
-        self._open = np.zeros((num_worlds, len(scene.goal_lines)), np.bool_)
-        moments = substeps + 1 if scene.path else 0
-        self._path_shape = (num_worlds, moments, scene.bodies.movers, 4)
+        self._rest = scene.still_state(num_worlds)
+        """State that `step` begins with before a `reset`, and whose `visible` all
+        states share, read-only."""
+        self._before = self._rest
 
     @classmethod
     def available(cls) -> str | None:
-        """None, or the reason why this backend cannot run here and the fix."""
+        """Return None, or the reason why it cannot run here and the fix."""
         return None
 
     @classmethod
     def supports(cls, scene: Scene) -> str | None:
-        """None, or the reason why this backend cannot play this scene."""
+        """Return None, or the reason why it cannot play this scene."""
         return None
 
     @abstractmethod
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         """Set the parameters of some worlds, by index (W,); values are (B,) each."""
 
-    @abstractmethod
-    def start(self, state: State, worlds: Array) -> None:
-        """Go on from ``state`` (of all B worlds); some, by index (W,), start anew."""
+    def reset(self, state: State, worlds: Array) -> None:
+        """Begin anew in some worlds, by index (W,), from rows of a state of all B.
+
+        What touches in the state has touched for long: it is no new contact and no new
+        crossing. Nothing is left of the past of these worlds.
+        """
+        self._before = state
 
     @abstractmethod
-    def step(self, command: Command) -> State:
-        """Move all worlds by ``control_dt``; ``time`` counts from the last start.
+    def stage(self, command: Command, before: State, after: State) -> Stage:
+        """Return a step of ``control_dt`` between states that stay, for all worlds.
 
-        The arrays of the state are its own, or those of `quiet`.
+        It fills the `RESULTS` of ``after`` (and ``path``, if the scene asks for it);
+        ``before`` is the state that it filled last, or that of a `reset`.
         """
 
-    def _follow(self, command: Command, position: Array) -> tuple[Array, Array, Array]:
-        """How fast seats go (B, seats, 2), who of them is prescribed, and who is lifted."""
-        if command.prescribed is None:
-            return command.velocity, self._nobody, self._nobody
-        prescribed = np.asarray(np.isfinite(command.prescribed).all(-1))
-        way = command.prescribed[..., :2] - position[:, : prescribed.shape[1]]
-        way /= self.control_dt
-        lifted = prescribed & (
-            np.hypot(way[..., 0], way[..., 1]) > MAX_PRESCRIBED_SPEED
-        )
-        return (
-            np.where(prescribed[..., None], way, command.velocity),
-            prescribed,
-            lifted,
-        )
+    def step(self, command: Command) -> State:
+        """Return the state after a step, freshly allocated.
+
+        For use without a `World`, which runs `stage` on arrays that stay.
+        """
+        after = self.empty_state()
+        self.stage(command, self._before, after)()
+        self._before = after
+        return after
 
     def empty_state(self) -> State:
-        """A state with arrays of its own, of any content, of what steps change."""
-        fields: dict[str, Array] = {
-            name: np.empty_like(getattr(self.rest_state, name)) for name in RESULTS
-        }
+        """Return a state whose `RESULTS` and ``path`` are freshly allocated."""
+        fields = {n: np.zeros_like(getattr(self._rest, n)) for n in RESULTS}
+        path = None
         if self.scene.path:
-            fields["path"] = np.empty(self._path_shape)
-        return self.rest_state.replaced(fields)
-
-    def stage(self, goal: Array, before: State, after: State) -> Stage:
-        """A step from one state that stays into another, for a chain.
-
-        Args:
-            goal: (B, seats, 2) m/s, where all ask.
-            before: the step.
-            after: the step; its motion and events are filled.
-
-        Raises:
-            Unchained: a step is not one compiled function.
-        """
-        raise NotCompilable(f"{type(self).__name__} has no compiled step")
-
-    def begin(self) -> None:
-        """What is to be done before a stage."""
-        return None
-
-    def finish(self, goal: Array, after: State) -> None:
-        """What is left to be done after a stage: the worlds are in ``after`` now."""
-        return None
+            moments, movers = self.substeps + 1, self.scene.bodies.movers
+            path = np.zeros((self.num_worlds, moments, movers, 4))
+        bodies, visible = self.scene.bodies, self._rest.visible
+        return State(bodies=bodies, visible=visible, path=path, **fields)
 
     def photograph(
         self, world: int, camera: str, marks: Sequence[Mark], width: int
     ) -> Array:
-        """(H, W, 3) uint8 of what one of the `cameras` sees of a world.
+        """Return (H, W, 3) uint8 of what one of the `cameras` sees of a world.
 
         Raises:
             RuntimeError: it cannot be drawn here; says what to install.
@@ -151,5 +134,5 @@ class Backend(ABC):
         raise NotImplementedError
 
     def close(self) -> None:
-        """Let go of whatever the backend holds."""
+        """Free whatever the backend holds."""
         return None

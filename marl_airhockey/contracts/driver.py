@@ -1,7 +1,7 @@
-"""The driver contract: whatever moves a paddle.
+"""Driver contract: whatever moves a paddle.
 
 A driver *asks* for a velocity (policy, script, mouse) and the backend moves the paddle,
-or it *tells* where the paddle is (a hand under a camera, a robot with its own
+or it *prescribes* where the paddle is (a hand under a camera, a robot with its own
 controller) and the backend follows.
 """
 
@@ -21,10 +21,10 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class View:
-    """What one seat senses in B worlds."""
+    """Senses of one seat in B worlds."""
 
     scene: Scene
-    """Who and what is on the table."""
+    """Seats, bodies and goal lines on the table."""
     state: State
     """The sensed state, rotated into the seat's ego frame."""
     observation: Array | Mapping[str, Array]
@@ -32,7 +32,7 @@ class View:
     labels: tuple[str, ...]
     """Name of each element of a flat observation."""
     top_speed: Array
-    """(B,) m/s: what an asked norm of 1 stands for."""
+    """(B,) m/s: speed of an action of norm 1."""
     reach: Array
     """(K, 2) corners of the seat's reach, ego frame, m."""
     rng: RandomStreams
@@ -48,7 +48,7 @@ PrescribedMotion = Array
 
 
 class Driver:
-    """Drives one seat in B worlds.
+    """Driver of one seat in B worlds.
 
     Policies and scripts are pure: what they keep between steps is the memory, arrays
     with one row a world.
@@ -59,21 +59,21 @@ class Driver:
     control_dt: float | None = None
     """s between two decisions, a multiple of the environment's; None for the same."""
 
-    def start(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        """Memory of ``worlds`` worlds whose episode begins."""
+    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+        """Return the memory of ``worlds`` worlds whose episode begins."""
         return {}
 
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """The asked velocity (B, 2) as a fraction of top speed, and the memory.
+        """Return the action (B, 2), a velocity as a fraction of top speed, and the memory.
 
-        A driver that tells never gets here.
+        It is not called of a driver that prescribes.
         """
-        raise NotImplementedError(f"{type(self).__name__} does not ask")
+        raise NotImplementedError(f"{type(self).__name__} has no act()")
 
     def measured(self) -> PrescribedMotion | None:
-        """(B, 4) where the paddle is, if the driver tells; None if it asks."""
+        """Return (B, 4) where the paddle is, if it prescribes; None if it asks."""
         return None
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""The scenario contract: who is on the table, how it starts, what is wanted and final.
+"""Scenario contract: who is on the table, how it starts, what is wanted and final.
 
 Scenario functions are pure and vectorised: the same code judges one world, 4096 worlds
 and a stored dataset. Leading axes are the caller's.
@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -22,13 +22,28 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import SEAT_KINDS, Seat, make_seat
 from marl_airhockey.core.state import State
 from marl_airhockey.core.table import TABLES, Table
-from marl_airhockey.core.touches import count_touches
+from marl_airhockey.core.touches import count_touches, no_touches
 from marl_airhockey.types import Array, Memory
+
+
+class Transition(NamedTuple):
+    """One control step, as the functions of a scenario see it; leading axes (...)."""
+
+    before: State
+    command: Array
+    """(..., seats, 2) velocity that the limits passed, m/s, table frame"""
+    after: State
+    memory: Memory
+    """Memory of before the step"""
+    new_memory: Memory
+    """Memory of after the step"""
+    last: Array
+    """(...) bool: the clock ends the episode with this step"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scenario(ABC):
-    """One scenario; its fields are its options.
+    """Scenario whose fields are its options.
 
     Memory holds arrays by name, (..., *); `touches` and `apart` (see
     `touches.count_touches`) are kept for every scenario with pucks.
@@ -41,8 +56,8 @@ class Scenario(ABC):
     goals: str = "flat"
     """"dict" shows wanted and achieved goals apart, as HER needs them."""
     jitter_weight: float = 0.01
-    """Cost of a squared change of the sent velocity, in top speeds."""
-    turn_weight: float = 0.0
+    """Cost of a squared change of the commanded velocity, in top speeds."""
+    turning_weight: float = 0.0
     """Cost of a sudden change of direction."""
 
     seconds: float
@@ -73,60 +88,68 @@ class Scenario(ABC):
         """Seats, bodies and goal lines."""
 
     @abstractmethod
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        """First states and memories of ``worlds`` worlds, one row each."""
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        """Draw first states and memories of ``worlds`` worlds, one row each."""
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        """What changes in the memory by a step.
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        """Return the memory of an episode that begins in given states, one row each.
 
-        ``memory`` holds the new touches already, all else as it was before the step. An
-        event that happens once needs a flag of its own, ``old | now``.
+        An episode can begin anywhere: `reset`, a state that is set from outside, a
+        replay, a real table. Scenarios add their own to what this returns.
+        """
+        return no_touches(state) if state.bodies.pucks else {}
+
+    def update_memory(self, t: Transition) -> Memory:
+        """Return what changes in the memory by a step.
+
+        ``t.memory`` is that of before the step, ``t.new_memory`` the same with the new
+        touches. An event that happens once needs a flag of its own, ``old | now``.
         """
         return {}
 
     @property
     @abstractmethod
     def observation(self) -> tuple[Observable, ...]:
-        """What a seat is shown."""
+        """Observables that a seat is shown, side by side."""
 
     @abstractmethod
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
-        """Named terms, (..., seats) each; the reward is their sum."""
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return named terms, (..., seats) each; the reward is their sum."""
 
-    def terminated(self, after: State, memory: Memory) -> Array:
+    def terminated(self, t: Transition) -> Array:
         """(...) bool: the episode ended for a reason inside the game."""
-        return np.zeros(after.time.shape, np.bool_)
+        return np.zeros(t.after.time.shape, np.bool_)
 
-    def restart(
-        self, rng: RandomStreams, after: State, memory: Memory
-    ) -> tuple[Array, State, Memory] | None:
-        """Serve again inside an episode, for games that go on after a goal.
-
-        Returns None, or some of the worlds, by index (W,), and rows for them.
-        """
+    def needs_serve(self, t: Transition) -> Array | None:
+        """(...) bool: a puck is to be served after the step; None if never."""
         return None
 
+    def serve(
+        self, rng: RandomStreams, state: State, memory: Memory
+    ) -> tuple[State, Memory]:
+        """Serve in the worlds that need it, and in these alone, one row each.
+
+        The rows are copies, which may be changed and returned.
+        """
+        raise NotImplementedError(f"{type(self).__name__} serves no puck")
+
     def retired(self, memory: Memory) -> Array | None:
-        """(..., seats) bool: who is out of the game; None where nobody ever is.
+        """(..., seats) bool: the seat is out of the game; None where none ever is.
 
         Their paddles stand behind their sides, whose goal lines are wall.
         """
         return None
 
     @abstractmethod
-    def success(self, after: State, memory: Memory) -> Array:
+    def success(self, t: Transition) -> Array:
         """(...) or (..., seats) bool: what a paper reports; latched per episode."""
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
-        """What to draw for one world, leading axes gone."""
+        """Return what to draw for one world, leading axes gone."""
         return []
 
     def caption(self, memory: Memory) -> str:
-        """The score of one world in a few words."""
+        """Return the score of one world in a few words."""
         touches = memory.get("touches")
         return "" if touches is None else f"touches {int(touches.sum())}"
 
@@ -134,76 +157,73 @@ class Scenario(ABC):
 
     @property
     def name(self) -> str:
-        """The name of the file that the scenario comes from."""
+        """Name of the file that the scenario comes from."""
         return type(self).__module__.rpartition(".")[2]
 
     @cached_property
     def table_geometry(self) -> Table:
-        """The table that the option names."""
+        """Table that the option names."""
         return TABLES[self.table]
 
     def seat(self, side: int = 0, others: tuple[int, ...] = (), team: int = 0) -> Seat:
-        """A seat of the chosen kind at a side of the table."""
+        """Return a seat of the chosen kind at a side of the table."""
         return make_seat(self.seats, self.table_geometry, side, others, team)
 
-    def next_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        """The memory after a step: touches, then what the scenario counts."""
-        new = dict(memory)
-        if after.bodies.pucks:
-            new.update(count_touches(memory, before, after))
-        new.update(self.update_memory(new, before, command, after))
+    def next_memory(self, t: Transition) -> Memory:
+        """Return the memory after a step: touches, then what the scenario counts."""
+        new = dict(t.memory)
+        if t.after.bodies.pucks:
+            new.update(count_touches(t.memory, t.before, t.after))
+        new.update(self.update_memory(t._replace(new_memory=new)))
         return new
 
-    def all_reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
-        """All reward terms, the regularising ones included, (..., seats) each."""
+    def all_reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return all reward terms, the regularising ones included, (..., seats) each."""
         if self.goals == "dict":
-            return {"goal": self.goal_met(after, new)[..., None].astype(np.float64)}
-        terms = self.reward_terms(before, command, after, old, new)
+            met = self.goal_met(t.after, t.new_memory)
+            return {"goal": met[..., None].astype(np.float64)}
+        terms = self.reward_terms(t)
         if self.jitter_weight:
-            top = self.scene.seats[0].speed
-            cost = jitter(before, command, top)
+            cost = _jitter(t.before, t.command, self.scene.seats[0].speed)
             terms["jitter"] = -self.jitter_weight * cost
-        if self.turn_weight:
-            terms["turn"] = -self.turn_weight * turning(before, command)
+        if self.turning_weight:
+            terms["turning"] = -self.turning_weight * _turning(t.before, t.command)
         return terms
 
-    def is_terminated(self, after: State, memory: Memory) -> Array:
+    def is_terminated(self, t: Transition) -> Array:
         """(...) bool: `terminated`; with goals="dict" only a met goal ends it."""
         if self.goals == "dict":
-            return self.goal_met(after, memory)
-        return self.terminated(after, memory)
+            return self.goal_met(t.after, t.new_memory)
+        return self.terminated(t)
 
-    def is_success(self, after: State, memory: Memory) -> Array:
-        """`success`; with goals="dict" it is that the goal is met."""
+    def is_success(self, t: Transition) -> Array:
+        """(...) or (..., seats) bool: `success`; with goals="dict" the goal is met."""
         if self.goals == "dict":
-            return self.goal_met(after, memory)
-        return self.success(after, memory)
+            return self.goal_met(t.after, t.new_memory)
+        return self.success(t)
 
-    def goal_met(self, after: State, memory: Memory) -> Array:
-        """(...) bool: the wanted goal is met at this state, judged by goals alone."""
+    def goal_met(self, state: State, memory: Memory) -> Array:
+        """(...) bool: the wanted goal is met at a state, judged by goals alone."""
         raise NotImplementedError(f"{type(self).__name__} has no wanted goal")
 
     def replay_memory(self, memory: Memory, states: State, command: Array) -> Memory:
-        """Fold `advance` over a recording.
+        """Fold `next_memory` over a recording without a last step by the clock.
 
         Args:
             memory: at the start, (...).
             states: (T + 1, ...) states.
-            command: (T, ..., seats, 2) velocities.
+            command: (T, ..., seats, 2) velocities, m/s.
 
         Returns:
-            The memories (T + 1, ...), the first being ``memory``.
+            Memories (T + 1, ...), the first being ``memory``.
         """
-        all_of = [memory]
-        for t in range(len(command)):
-            before = states.map(lambda x, t=t: x[t])  # type: ignore[misc]
-            after = states.map(lambda x, t=t: x[t + 1])  # type: ignore[misc]
-            all_of.append(self.next_memory(all_of[-1], before, command[t], after))
-        return {name: np.stack([m[name] for m in all_of]) for name in memory}
+        memories = [memory]
+        for k in range(len(command)):
+            before, after = (states.map(lambda x, i=i: x[i]) for i in (k, k + 1))  # type: ignore[misc]
+            old, last = memories[-1], np.zeros(after.time.shape, np.bool_)
+            step = Transition(before, command[k], after, old, old, last)
+            memories.append(self.next_memory(step))
+        return {name: np.stack([m[name] for m in memories]) for name in memory}
 
 
 def _check_number(name: str, kind: object, value: object) -> None:
@@ -225,7 +245,7 @@ def _check_number(name: str, kind: object, value: object) -> None:
 
 
 class GoalScenario(Scenario):
-    """A scenario with a wanted goal, which can be relabelled afterwards."""
+    """Scenario with a wanted goal, which can be relabelled afterwards."""
 
     @property
     @abstractmethod
@@ -244,21 +264,20 @@ class GoalScenario(Scenario):
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
         """(...) 1 where the goal is met, else 0; of goals alone."""
 
-    def goal_met(self, after: State, memory: Memory) -> Array:
-        reward = self.goal_reward(self.achieved(after, memory), self.desired(memory))
-        goal_met: Array = reward > 0
-        return goal_met
+    def goal_met(self, state: State, memory: Memory) -> Array:
+        reward = self.goal_reward(self.achieved(state, memory), self.desired(memory))
+        return np.asarray(reward > 0)
 
 
-def jitter(before: State, command: Array, top_speed: Array | float) -> Array:
-    """(..., seats) squared change of the sent velocity, in top speeds."""
+def _jitter(before: State, command: Array, top_speed: Array | float) -> Array:
+    """(..., seats) squared change of the commanded velocity, in top speeds."""
     change = (command - before.paddle_velocity) / top_speed
     x, y = change[..., 0], change[..., 1]
     squared: Array = x * x + y * y
     return squared
 
 
-def turning(before: State, command: Array) -> Array:
+def _turning(before: State, command: Array) -> Array:
     """(..., seats) sudden change of direction: 0 straight on, 1 for a reversal."""
     old = before.paddle_velocity
     size = length(old) * length(command)

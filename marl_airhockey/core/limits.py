@@ -1,7 +1,7 @@
-"""From asked to sent: the one filter between every driver and every paddle.
+"""Limits: the one filter between the actions of all drivers and the paddles.
 
-A sent velocity is within the top speed, within the acceleration of the one before, and
-toward an edge of the reach at most what can still brake in front of it, so that no
+A commanded velocity is within the top speed, within the acceleration of the one before,
+and toward an edge of the reach at most what can still brake in front of it, so that no
 position is ever clipped.
 """
 
@@ -21,129 +21,91 @@ JERK = 40.0
 reversal of the acceleration within one 50 ms control step."""
 
 
-class Sent(NamedTuple):
-    """What a filter lets through, and what it held back."""
+class Limited(NamedTuple):
+    """Result of the limits: what is commanded, and what was taken off."""
 
     velocity: Array
-    """(B, S, 2) m/s, reached at the end of the step by a linear ramp"""
-    pushed: Array
-    """(B, S, 2) m/s2, the acceleration that it takes"""
-    excess: Array
-    """(B, S, 5) by how much the asked velocity went beyond each limit, zero if not: see
-    `EXCESS`"""
+    """(B, S, 2) m/s, table frame, reached at the end of the step by a linear ramp"""
+    acceleration: Array
+    """(B, S, 2) m/s2 of that ramp"""
+    violation: Array
+    """(B, S, 5) excess of the action over each limit, 0 within it: see `VIOLATIONS`"""
 
     @staticmethod
-    def blank(asked: Array) -> Sent:
-        """Arrays of any content for what is asked, (B, S, 2)."""
-        excess = np.empty((*asked.shape[:-1], len(VIOLATIONS)))
-        return Sent(np.empty(asked.shape), np.empty(asked.shape), excess)
+    def empty(worlds: int, seats: int) -> Limited:
+        """Return arrays that are zero, for B worlds and S seats."""
+        shape = (worlds, seats, 2)
+        violation = np.zeros((*shape[:-1], len(VIOLATIONS)))
+        return Limited(np.zeros(shape), np.zeros(shape), violation)
 
 
 VIOLATIONS = ("speed", "acceleration", "jerk", "reach", "cost")
-"""Of the asked velocity: m/s, m/s2, m/s3, m/s taken off toward an edge of the reach,
-and all of them in units of their limits, summed."""
+"""Columns of `violation`: excess over the limits of speed (m/s), acceleration (m/s2)
+and jerk (m/s3); speed removed toward an edge of the reach (m/s); and the sum of the
+four, each divided by its limit (the reach by the top speed)."""
 
 
 INFINITE = "action: every element must be finite, got nan or inf"
 
 
-def limits(
-    asked: Array,
-    position: Array,
-    velocity: Array,
-    pushed: Array,
+def limits_stage(
+    action: Array,
+    prescribed: Array,
+    before: tuple[Array, Array, Array],
     reach: ReachPlanes,
-    speed: Array,
-    acceleration: Array,
+    top: tuple[Array, Array],
     dt: float,
-) -> Sent:
-    """What is sent for what is asked; all but that in the table frame.
+    after: Limited,
+) -> Stage:
+    """Return the limits from and into arrays that stay; all but actions in table frame.
+
+    It stops at an action that is not finite (`INFINITE`).
 
     Args:
         action: (B, S, 2) wanted velocity as a fraction of top speed, ego frames.
-        position: (B, N, 2) of all bodies, paddles first, m.
-        velocity: (B, N, 2) of all bodies, m/s; a paddle's is what was sent last.
-        pushed: (B, S, 2) acceleration of the last step, m/s2.
-        reach: the seats' reaches.
-        speed: (B,) top speed, m/s.
-        acceleration: (B,) largest change of velocity, m/s2.
+        prescribed: (B, S, 4) position and velocity of prescribed paddles, nan for all
+            others; its velocity is passed on as it is.
+        before: position (B, N, 2) m and velocity (B, N, 2) m/s of all bodies, paddles
+            first, whose velocity is the last command; acceleration (B, S, 2) m/s2 of
+            the last step.
+        reach: of the seats.
+        top: (B,) top speed, m/s, and (B,) largest acceleration, m/s2.
         dt: length of a control step, s.
-
-    Raises:
-        ValueError: an asked velocity that is not finite.
+        after: filled.
     """
-    sent = Sent.blank(asked)
-    finite = _filter(
-        asked,
-        position,
-        velocity,
-        pushed,
-        reach.normals,
-        reach.offsets,
-        reach.share,
-        reach.turn,
-        reach.passes,
-        speed,
-        acceleration,
-        dt,
-        *sent,
-    )
-    if not finite:
-        raise ValueError(INFINITE)
-    return sent
-
-
-def limits_stage(
-    asked: Array,
-    position: Array,
-    velocity: Array,
-    pushed: Array,
-    reach: ReachPlanes,
-    speed: Array,
-    acceleration: Array,
-    dt: float,
-    sent: Sent,
-) -> Stage:
-    """The same from and into arrays that stay; it stops where it would raise."""
-    shared = (reach.normals, reach.offsets, reach.share, reach.turn)
-    return Stage(
-        _filter,
-        (
-            *(asked, position, velocity, pushed),
-            *map(Fixed, shared),
-            *(reach.passes, speed, acceleration, dt),
-            *sent,
-        ),
-        stops=True,
-    )
+    shared = (reach.normals, reach.offsets, reach.share, reach.rotation)
+    fixed = map(Fixed, shared)
+    arguments = (action, prescribed, *before, *fixed, reach.passes, *top, dt, *after)
+    return Stage(_limit, arguments, stops=True)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _filter(
-    asked: Array,
+def _limit(
+    action: Array,
+    prescribed: Array,
     position: Array,
     velocity: Array,
-    pushed: Array,
+    last_acceleration: Array,
     normals: Array,
     offsets: Array,
     share: Array,
-    turn: Array,
+    rotation: Array,
     passes: int,
-    speed: Array,
-    acceleration: Array,
+    top_speed: Array,
+    top_acceleration: Array,
     dt: float,
-    sent: Array,
-    push: Array,
-    excess: Array,
+    command: Array,
+    acceleration: Array,
+    violation: Array,
 ) -> bool:
-    """`limits` for each seat of each world; False if an asked one is not finite."""
+    """Fill the result for each seat of each world; False at an infinite action."""
     edges, rate = normals.shape[1], 1.0 / dt
     # The edges that are close, and how fast a paddle may go toward each.
     close, fastest = np.empty(edges, np.int64), np.empty(edges)
 
     # Functions in place: calls with arrays would cost more than the arithmetic.
     def inside(s: int, count: int, x: float, y: float) -> tuple[float, float]:
-        """A velocity with what goes too fast toward an edge taken off."""
+        """Take off a velocity what goes too fast toward an edge."""
         for _ in range(passes):
             for i in range(count):
                 nx, ny = normals[s, close[i], 0], normals[s, close[i], 1]
@@ -152,12 +114,13 @@ def _filter(
                     x, y = x + over * nx, y + over * ny
         return x, y
 
-    for b in range(asked.shape[0]):
-        top, most = speed[b], acceleration[b] * dt
-        for s in range(asked.shape[1]):
-            ahead, aside = top * asked[b, s, 0], top * asked[b, s, 1]
-            ax = turn[s, 0, 0] * ahead + turn[s, 1, 0] * aside
-            ay = turn[s, 0, 1] * ahead + turn[s, 1, 1] * aside
+    for b in range(action.shape[0]):
+        top, hardest = top_speed[b], top_acceleration[b]
+        most = hardest * dt
+        for s in range(action.shape[1]):
+            ahead, aside = top * action[b, s, 0], top * action[b, s, 1]
+            ax = rotation[s, 0, 0] * ahead + rotation[s, 1, 0] * aside
+            ay = rotation[s, 0, 1] * ahead + rotation[s, 1, 1] * aside
             vx, vy = velocity[b, s, 0], velocity[b, s, 1]
             square, norm, fit = ax * ax + ay * ay, top, 1.0
             if not square <= top * top:
@@ -173,7 +136,7 @@ def _filter(
             # Toward edge k at most h: after this step a full stop must still fit.
             # This step takes (v + h) dt / 2; the stop h^2 / 2a and, in ramped steps,
             # up to h dt / 2 more. It never needs more than the planned deceleration.
-            planned = acceleration[b] * share[s]
+            planned = hardest * share[s]
             inverse = 1.0 / planned
             ample = top * (0.5 * top * inverse + dt)
             px, py, count = position[b, s, 0], position[b, s, 1], 0
@@ -194,27 +157,30 @@ def _filter(
                 bx, by = inside(s, count, vx, vy)
                 share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
                 sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
-            sent[b, s, 0], sent[b, s, 1] = sx, sy
-            push[b, s, 0], push[b, s, 1] = (sx - vx) * rate, (sy - vy) * rate
-
-            jx = dx * rate - pushed[b, s, 0]
-            jy = dy * rate - pushed[b, s, 1]
-            jolt, rough = jx * jx + jy * jy, JERK * most
-            fast = max(norm - top * (1 + 1e-6), 0.0)
-            hard = max(change * rate - acceleration[b] * (1 + 1e-6), 0.0)
-            # Roots are dear; most worlds need neither.
-            jerky = rate * (np.sqrt(jolt) - rough) if jolt > rough * rough else 0.0
             held = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2) if count else 0.0
-            excess[b, s, 0], excess[b, s, 1] = fast, hard
-            excess[b, s, 2], excess[b, s, 3] = jerky, held
-            cost = (fast + held) / top + (hard + jerky / JERK) / acceleration[b]
-            excess[b, s, 4] = cost
+            if np.isfinite(prescribed[b, s, 2]) and np.isfinite(prescribed[b, s, 3]):
+                sx, sy = prescribed[b, s, 2], prescribed[b, s, 3]
+            command[b, s, 0], command[b, s, 1] = sx, sy
+            acceleration[b, s, 0] = (sx - vx) * rate
+            acceleration[b, s, 1] = (sy - vy) * rate
+
+            jx = dx * rate - last_acceleration[b, s, 0]
+            jy = dy * rate - last_acceleration[b, s, 1]
+            jerk, rough = jx * jx + jy * jy, JERK * most
+            fast = max(norm - top * (1 + 1e-6), 0.0)
+            hard = max(change * rate - hardest * (1 + 1e-6), 0.0)
+            # Roots are dear; most worlds need neither.
+            jerky = rate * (np.sqrt(jerk) - rough) if jerk > rough * rough else 0.0
+            violation[b, s, 0], violation[b, s, 1] = fast, hard
+            violation[b, s, 2], violation[b, s, 3] = jerky, held
+            cost = (fast + held) / top + (hard + jerky / JERK) / hardest
+            violation[b, s, 4] = cost
     return True
 
 
 @njit(cache=True, error_model="numpy")
 def _within(wx: float, wy: float, dx: float, dy: float, most: float) -> float:
-    """The largest share of (wx, wy) with |(dx, dy) + share (wx, wy)| <= most, 0..1."""
+    """Return the largest share of (wx, wy) with |(dx, dy) + share (wx, wy)| <= most, 0..1."""
     a = max(wx * wx + wy * wy, 1e-18)
     b = dx * wx + dy * wy
     c = dx * dx + dy * dy - most * most

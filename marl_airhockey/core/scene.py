@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from marl_airhockey.core.seat import Seat
-from marl_airhockey.core.state import Bodies
+from marl_airhockey.core.state import Bodies, State
 from marl_airhockey.core.table import Table
 from marl_airhockey.types import Array
 
@@ -100,6 +100,33 @@ class Scene:
     def goal_line(self, name: str) -> int:
         """Index of the goal line with this name."""
         return [m.name for m in self.goal_lines].index(name)
+
+    def still_state(self, worlds: int) -> State:
+        """Return rows with every body at the origin, at rest, and no contact.
+
+        Obstacles are at their places; arrays are freshly allocated.
+        """
+        bodies, count = self.bodies, len(self.bodies)
+        pucks, pairs = (worlds, bodies.pucks), (worlds, bodies.paddles, bodies.pucks)
+        lines, sides = len(self.goal_lines), len(self.table.vertices)
+        position = np.zeros((worlds, count, 2))
+        for i, obstacle in enumerate(self.obstacles, start=bodies.movers):
+            position[:, i] = obstacle.start
+        return State(
+            bodies=bodies,
+            position=position,
+            velocity=np.zeros((worlds, count, 2)),
+            angle=np.zeros((worlds, count)),
+            spin=np.zeros((worlds, count)),
+            touched=np.zeros(pairs, np.int64),
+            touched_at=np.full(pairs, np.nan),
+            touching=np.zeros(pairs, np.bool_),
+            banked=np.zeros((*pucks, sides), np.int64),
+            crossed=np.zeros((*pucks, lines), np.bool_),
+            crossed_velocity=np.zeros((*pucks, lines, 2)),
+            visible=np.ones(pucks, np.bool_),
+            time=np.zeros(worlds),
+        )
 
     @cached_property
     def defaults(self) -> dict[str, float]:

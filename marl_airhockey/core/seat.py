@@ -1,4 +1,4 @@
-"""Seat: see the definitions."""
+"""Seat: a place at the table for one paddle, its reach and its limits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SEAT_KINDS: tuple[str, ...] = ("robot", "arcade")
 
 @dataclass(frozen=True)
 class Seat:
-    """A place at the table: one paddle, what it can reach and how fast it can be."""
+    """Place at the table: one paddle, what it can reach and how fast it can be."""
 
     side: int
     """The side of the table it belongs to."""
@@ -36,7 +36,7 @@ class Seat:
 def make_seat(
     kind: str, table: Table, side: int, others: tuple[int, ...] = (), team: int = 0
 ) -> Seat:
-    """A seat of a kind at a side of a table.
+    """Return a seat of a kind at a side of a table.
 
     ``robot``: what a UR5e can hold with its base 0.22 m behind its edge, a box of
     0.42 x 0.50 m that begins 78 mm from the edge, with far corners cut at the slope of
@@ -86,7 +86,7 @@ def make_seat(
 
 @cache
 def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
-    """Edges of the reaches of S seats in the table frame.
+    """Return the edges of the reaches of S seats in the table frame.
 
     Returns:
         Inward unit normals (S, K, 2), zero where a seat has fewer edges, and offsets
@@ -104,7 +104,7 @@ def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class ReachPlanes:
-    """The reaches of S seats as half-planes of the table frame."""
+    """Reaches of S seats as half-planes of the table frame."""
 
     normals: Array
     """(S, K, 2) inward unit normals; zero where a seat has fewer edges"""
@@ -113,14 +113,14 @@ class ReachPlanes:
     share: Array
     """(S,) of the acceleration that may be planned against one edge, so that braking
     against both edges of a corner together stays within it"""
-    turn: Array
+    rotation: Array
     """(S, 2, 2) from the table frame to each seat's ego frame"""
     passes: int
     """Rounds of projection: more than one if any corner is sharper than 90 degrees"""
 
     @staticmethod
     def of(table: Table, seats: tuple[Seat, ...]) -> ReachPlanes:
-        """The reaches of the seats of a table."""
+        """Return the reaches of the seats of a table."""
         normals, offsets = reaches(table, seats)
         share, sharpest = np.ones(len(seats)), 1.0
         for s, seat in enumerate(seats):
@@ -128,6 +128,6 @@ class ReachPlanes:
             cosine = np.einsum("kd,kd->k", normal, np.roll(normal, -1, axis=0)).min()
             share[s] = np.sqrt((1 + cosine) / 2)
             sharpest = min(sharpest, cosine)
-        turn = np.array([table.rotation(seat.side) for seat in seats])
+        rotation = np.array([table.rotation(seat.side) for seat in seats])
         passes = 1 if sharpest > -1e-9 else 12
-        return ReachPlanes(normals, offsets, share, turn, passes)
+        return ReachPlanes(normals, offsets, share, rotation, passes)

@@ -1,4 +1,4 @@
-"""What every backend reports and every scenario reads: arrays of bodies on a table.
+"""State of B worlds: what every backend reports and every scenario reads.
 
 Axes are named from the right, ``(..., bodies, 2)``. What stands to the left belongs to
 the caller: nothing, ``(B,)`` worlds, or ``(T, B)`` a stored dataset.
@@ -6,19 +6,17 @@ the caller: nothing, ``(B,)`` worlds, or ``(T, B)`` a stored dataset.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
-
-import numpy as np
 
 from marl_airhockey.types import Array
 
 
 class Kind(IntEnum):
-    """What a body is; bodies are sorted by kind."""
+    """Kind of a body; bodies are sorted by kind."""
 
     PADDLE = 0
     PUCK = 1
@@ -28,7 +26,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Bodies:
-    """The static side of a state: how many bodies of each kind, and how large."""
+    """Static side of a state: number of bodies of each kind, and their sizes."""
 
     paddles: int
     pucks: int
@@ -39,23 +37,23 @@ class Bodies:
 
     @cached_property
     def kind(self) -> tuple[Kind, ...]:
-        """The kind of each body, sorted."""
+        """Kind of each body, sorted."""
         counts = (self.paddles, self.pucks, self.blocks, self.obstacles)
         return tuple(k for k, n in zip(Kind, counts, strict=True) for _ in range(n))
 
     @cached_property
     def paddle(self) -> slice:
-        """Where the paddles are."""
+        """Indices of the paddles."""
         return slice(0, self.paddles)
 
     @cached_property
     def puck(self) -> slice:
-        """Where the pucks are."""
+        """Indices of the pucks."""
         return slice(self.paddles, self.paddles + self.pucks)
 
     @cached_property
     def block(self) -> slice:
-        """Where the blocks are."""
+        """Indices of the blocks."""
         first = self.paddles + self.pucks
         return slice(first, first + self.blocks)
 
@@ -72,8 +70,7 @@ class Bodies:
 class State:
     """All bodies at one moment, in the table frame (or a seat's ego frame), SI units.
 
-    The contact fields tell what happened since the state before this one. What only
-    one backend knows lives in ``extra``, which scenarios do not read.
+    The contact fields tell what happened since the state before this one.
     """
 
     bodies: Bodies
@@ -91,6 +88,8 @@ class State:
     """(..., paddles, pucks) s into the step of the last one that began, nan if none"""
     touching: Array
     """(..., paddles, pucks) in contact at the end of the step"""
+    banked: Array
+    """(..., pucks, sides) bounces off each side of the table that began in the step"""
     crossed: Array
     """(..., pucks, goal_lines) bool: went through, or touched a goal line that is a wall"""
     crossed_velocity: Array
@@ -101,7 +100,6 @@ class State:
     """(...) s since the start of the episode"""
     path: Array | None = None
     """(..., K + 1, movers, 4) x, y, vx, vy at every substep, if the scene asks for it"""
-    extra: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def paddle(self) -> Array:
@@ -134,72 +132,24 @@ class State:
         return self.velocity[..., self.bodies.block, :]
 
     def map(self, change: Callable[[Array], Array]) -> State:
-        """The state with ``change`` applied to every array: pick rows, stack times."""
+        """Return the state with ``change`` applied to every array, as picking rows."""
         arrays: dict[str, Any] = {n: change(getattr(self, n)) for n in ARRAYS}
         if self.path is not None:
             arrays["path"] = change(self.path)
-        extra = {name: change(value) for name, value in self.extra.items()}
-        return replace(self, **arrays, extra=extra)
+        return replace(self, **arrays)
 
-    def replaced(self, fields: Mapping[str, Any]) -> State:
-        """A state with some fields anew and all else shared; cheaper than `replace`."""
-        new = object.__new__(State)
-        new.__dict__.update(self.__dict__)
-        new.__dict__.update(fields)
-        return new
-
-    def write(self, worlds: Array, rows: State, shared: State) -> State:
-        """The state with ``rows`` in some worlds (W,), by index, and no path.
-
-        Its own arrays are changed in place; one that it shares with ``shared`` is
-        copied first, if it has to change.
-        """
-        new = self.replaced({"path": None})
-        for name in ARRAYS:
-            array, value = getattr(self, name), getattr(rows, name)
-            if array is getattr(shared, name):
-                if np.array_equal(array[worlds], value):
-                    continue
-                array = array.copy()
-                vars(new)[name] = array
-            array[worlds] = value
-        return new
+    def write(self, worlds: Array, rows: State) -> None:
+        """Copy the `RESULTS` of ``rows`` (W, ...) into some worlds (W,), by index."""
+        for name in RESULTS:
+            getattr(self, name)[worlds] = getattr(rows, name)
 
 
-ARRAYS = tuple(
-    f.name for f in fields(State) if f.name not in ("bodies", "path", "extra")
+ARRAYS = tuple(f.name for f in fields(State) if f.name not in ("bodies", "path"))
+"""Names of the fields that every state has."""
+EVENTS = (
+    *("touched", "touched_at", "touching", "banked"),
+    *("crossed", "crossed_velocity"),
 )
-
-
-EVENTS = ("touched", "touched_at", "touching", "crossed", "crossed_velocity")
-"""The arrays that tell what happened in a step."""
-
-
-RESULTS = ("position", "velocity", "time", *EVENTS)
-"""The arrays that every step of every backend makes anew."""
-
-
-def still_state(bodies: Bodies, worlds: int, goal_lines: int) -> State:
-    """``worlds`` rows with every body at the origin, at rest, and no contact.
-
-    Args:
-        bodies: the scene's bodies.
-        worlds: number of rows.
-        goal_lines: number of goal lines in the scene.
-    """
-    pucks, pairs = (worlds, bodies.pucks), (worlds, bodies.paddles, bodies.pucks)
-    n = len(bodies)
-    return State(
-        bodies=bodies,
-        position=np.zeros((worlds, n, 2)),
-        velocity=np.zeros((worlds, n, 2)),
-        angle=np.zeros((worlds, n)),
-        spin=np.zeros((worlds, n)),
-        touched=np.zeros(pairs, np.int64),
-        touched_at=np.full(pairs, np.nan),
-        touching=np.zeros(pairs, np.bool_),
-        crossed=np.zeros((*pucks, goal_lines), np.bool_),
-        crossed_velocity=np.zeros((*pucks, goal_lines, 2)),
-        visible=np.ones(pucks, np.bool_),
-        time=np.zeros(worlds),
-    )
+"""Names of the fields that tell what happened in a step."""
+RESULTS = ("position", "velocity", "angle", "spin", "time", *EVENTS)
+"""Names of the fields that every step of every backend writes."""

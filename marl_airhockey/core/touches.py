@@ -1,4 +1,4 @@
-"""Touches: see the definitions."""
+"""Touches: distinct contacts of paddles and pucks, counted in a memory."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ TOUCH_GAP = 0.15
 """s: a touch is distinct if it begins this long after the last contact ended."""
 
 
-def no_touches(worlds: int, paddles: int, pucks: int) -> Memory:
-    """The memory of `count_touches` at the start of an episode."""
+def no_touches(state: State) -> Memory:
+    """Return the memory of `count_touches` at the start of an episode, (W, ...) rows."""
     return {
-        "touches": np.zeros((worlds, paddles, pucks), np.int64),
-        "apart": np.full((worlds, paddles, pucks), np.inf),
-        "met": np.zeros(worlds, np.bool_),
+        "touches": np.zeros_like(state.touched),
+        "apart": np.where(state.touching, 0.0, np.inf),
+        "met": np.zeros(state.time.shape, np.bool_),
     }
 
 

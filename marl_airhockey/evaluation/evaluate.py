@@ -202,7 +202,7 @@ def _act_ms(world: World) -> float:
         rng=view.rng.select(np.array([0])),
         scenario_memory={k: v[:1] for k, v in view.scenario_memory.items()},
     )
-    memory = seat.driver.start(world.scene.seats[0], single.rng, 1)
+    memory = seat.driver.reset(world.scene.seats[0], single.rng, 1)
     times = []
     for _ in range(50):
         began = time.process_time()

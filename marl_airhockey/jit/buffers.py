@@ -1,4 +1,4 @@
-"""Fresh arrays for the results of a call, made many calls' worth at once."""
+"""Fresh arrays for the results of calls, allocated for many calls at once."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from marl_airhockey.types import Array
 
 ROWS = 64
-"""Rows of every array that are made at once: numpy hands out rows of an array faster
-than new arrays."""
+"""Rows of every array that are allocated at once: numpy hands out rows of an array
+faster than new arrays."""
 
 
 class BufferPool:
-    """Hands out arrays that nobody else has, of any content.
+    """Pool of freshly allocated, uninitialised arrays.
 
     Args:
         kinds: shape and type of a row of each array.
@@ -25,8 +25,11 @@ class BufferPool:
         self._kinds = list(kinds)
         self._waiting: dict[int, list[tuple[Array, ...]]] = {}
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_waiting": {}}
+
     def take(self, rows: int) -> tuple[Array, ...]:
-        """One array of each kind, with so many rows."""
+        """Return one array of each kind, with so many rows."""
         waiting = self._waiting.get(rows)
         if waiting:
             return waiting.pop()

@@ -1,4 +1,4 @@
-"""Writes what a tape recorded as a loop over worlds, and has numba compile it.
+"""Code generator: writes a tape as a loop over worlds and has numba compile it.
 
 The sources lie in the user's cache folder, with numba's compiled code beside them, so
 that a loop is compiled once per machine.
@@ -12,6 +12,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -23,9 +24,9 @@ from marl_airhockey.jit.tracer import Symbol, Tape
 from marl_airhockey.types import Array
 
 Call = Callable[..., tuple[dict[str, Array], ...]]
-"""Calls a loop: takes it, its output arrays, and the mappings of inputs."""
+"""Function that calls a loop, with its output arrays and the mappings of inputs."""
 Name = tuple[int, str]
-"""Of an input: which source, and its key there."""
+"""Name of an input: number of its source, and its key there."""
 
 INFIX = {
     "add": "+",
@@ -46,7 +47,7 @@ _loaded: dict[str, Loaded] = {}
 
 
 class Writer:
-    """Turns a tape into a module: the loop, and how to call it with mappings.
+    """Writer of a module for a tape: the loop, and how to call it with mappings.
 
     Args:
         tape: what was recorded.
@@ -61,11 +62,11 @@ class Writer:
         self._sinks: list[list[str]] = []
         self._live: set[Symbol] = set()
         self.inputs: dict[Name, str] = {}
-        """Those that are used: name -> variable"""
+        """Variables of the inputs that are used, by name"""
         self._axes: dict[Name, int] = {}
 
     def begin_sink(self) -> None:
-        """What follows goes into the next mapping."""
+        """Begin the next mapping of outputs."""
         self._sinks.append([])
 
     def store(self, key: str, place: Array, dtype: Any) -> None:
@@ -93,7 +94,7 @@ class Writer:
                 waiting += symbol.args
 
     def source(self, sources: int) -> str:
-        """The module, for a number of sources."""
+        """Return the module, for a number of sources."""
         live = [s for s in self._tape.symbols.values() if s in self._live]
         names = {symbol: f"t{i}" for i, symbol in enumerate(live)}
         body = [f"{names[s]} = {self._expression(s, names)}" for s in live]
@@ -119,7 +120,7 @@ class Writer:
         return "\n".join(lines) + "\n"
 
     def _expression(self, symbol: Symbol, names: dict[Symbol, str]) -> str:
-        """A symbol as an expression of numba."""
+        """Return a symbol as an expression of numba."""
         op = symbol.op
         if op == "input":
             name, index = symbol.args
@@ -153,30 +154,34 @@ def _is_truth(scalar: Any) -> bool:
 
 
 def _type(dtype: Any, axes: int) -> str:
-    """The type of an array as numba writes it, rows one behind the other."""
+    """Return the type of a contiguous array as numba writes it."""
     name = "boolean" if dtype == np.bool_ else np.dtype(dtype).name
     return f"{name}[{':, ' * (axes - 1)}::1]"
 
 
 class Loaded(NamedTuple):
-    """A written module."""
+    """Generated module and its compiled function."""
 
     kernel: Callable[..., Any]
     """Compiled"""
     module: ModuleType
 
 
-def load(source: str, names: Mapping[str, Any] | None = None) -> Loaded:
+def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Loaded:
     """Have numba compile a module's ``kernel`` for its ``SIGNATURE``.
+
+    What this machine has not compiled yet is announced on stderr, once a name.
 
     Args:
         source: of the module.
+        name: of what is compiled, for the announcement.
         names: what it finds under these names besides.
     """
     digest = hashlib.sha256(source.encode()).hexdigest()[:24]
     if digest not in _loaded:
         path = cache_folder() / f"loop_{digest}.py"
         if not path.exists():
+            _announce(name)
             part = path.with_suffix(f".{os.getpid()}")
             part.write_text(source)
             part.replace(path)
@@ -193,8 +198,21 @@ def load(source: str, names: Mapping[str, Any] | None = None) -> Loaded:
     return _loaded[digest]
 
 
+@cache
+def _announce(name: str) -> None:
+    print(f"marl_airhockey: compiling {name}, once per machine", file=sys.stderr)
+
+
+@cache
+def package_hash() -> str:
+    """Hash of all sources of the package, which code that calls them depends on."""
+    files = sorted(Path(__file__).parents[1].rglob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+@cache
 def cache_folder() -> Path:
-    """Where compiled loops are kept: MARL_AIRHOCKEY_CACHE, or the user's cache."""
+    """Folder of compiled loops: MARL_AIRHOCKEY_CACHE, or the user's cache."""
     given = os.environ.get("MARL_AIRHOCKEY_CACHE")
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     folder = Path(given) if given else Path(home) / "marl_airhockey"

@@ -1,13 +1,14 @@
-"""Pure numpy functions over worlds, compiled into one loop over the worlds.
+"""Fused: a pure numpy function over worlds, compiled into one loop over the worlds.
 
-Scenarios and views are written for arrays (..., *) whose leading axes are the caller's.
-So they can be run once on symbols of a single world (`symbols`), and what they did is
-compiled by numba: no temporaries, and no price of a numpy call for every operation.
-Code that cannot be traced runs as it is, with a warning that says why.
+Scenarios and observables are written for arrays (..., *) whose leading axes are the
+caller's. So they can be run once on symbols of a single world (`tracer`), and what they
+did is compiled by numba: no temporaries, and no price of a numpy call for every
+operation. Code that cannot be traced runs as it is, with a warning that says why.
 """
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -15,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.jit.buffers import BufferPool
-from marl_airhockey.jit.codegen import Call, Writer, load
-from marl_airhockey.jit.pipeline import NotCompilable, Stage
+from marl_airhockey.jit.codegen import Loaded, Writer, load
+from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.jit.threads import over_rows, spreads
 from marl_airhockey.jit.tracer import Tape
 from marl_airhockey.types import Array
@@ -26,54 +27,53 @@ Source = Mapping[str, Any]
 Sink = dict[str, Array]
 """Named arrays (B, *)."""
 Function = Callable[..., tuple[Sink, ...]]
-"""Takes sources and gives sinks, leading axes being the caller's."""
+"""Function from sources to sinks, whose leading axes are the caller's."""
 
 
 class Fused:
-    """A function of named arrays over worlds, compiled at its first call.
+    """Function of named arrays over worlds, compiled for the first ones it meets.
 
     Args:
         function: pure; takes mappings and gives mappings of arrays (..., *).
-        name: of what it does, for warnings.
+        name: of what it does, for warnings and announcements.
     """
 
     def __init__(self, function: Function, name: str) -> None:
         self._function, self._name = function, name
-        self._plan: _Plan | None = None
+        self._loop: _Loop | None = None
         self.refused: str | None = None
-        """Why it runs as plain numpy, if it does."""
+        """Reason why it runs as plain numpy; None if it is compiled, or not yet met."""
 
-    def __call__(self, *sources: Source) -> tuple[Sink, ...]:
-        """The sinks, for all worlds of the sources, in arrays that nobody else has."""
-        if self._plan is not None:
-            try:
-                return self._plan(sources)
-            except TypeError as error:
-                self._plan = None
-                self._refuse(error)
+    def prepare(self, *sources: Source) -> tuple[Sink, ...]:
+        """Compile for arrays like these; return what it makes of them, fresh arrays."""
         plain = self._function(*sources)
-        if self.refused is None:
+        off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0"
+        if self._loop is None and self.refused is None and not off:
             try:
-                plan = _Plan(self._function, sources, plain)
-                done = plan(sources)
-                _compare(done, plain)
+                loop = _Loop(self._function, sources, plain, self._name)
+                _compare(loop(sources), plain)
+                self._loop = loop
             except Exception as error:
                 self._refuse(error)
-            else:
-                self._plan = plan
-                return done
         # Copies, as numpy may have handed on what it was given.
         return tuple({k: np.array(v) for k, v in sink.items()} for sink in plain)
 
-    def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
-        """The compiled loop from sources into sinks that it once gave, for a chain.
+    def __call__(self, *sources: Source) -> tuple[Sink, ...]:
+        """Return the sinks for all worlds of the sources, freshly allocated."""
+        if self._loop is None:
+            return self.prepare(*sources)
+        return self._loop(sources)
 
-        Raises:
-            Unchained: there is none for such arrays.
+    def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
+        """Return the function from sources into sinks that stay, as a stage.
+
+        Args:
+            sources: as those of `prepare`.
+            sinks: as those that it returned.
         """
-        if self._plan is None:
-            raise NotCompilable(f"{self._name} is not compiled")
-        return self._plan.stage(sources, sinks)
+        if self._loop is not None:
+            return self._loop.stage(sources, sinks)
+        return Stage(_write, (self._function, sources, sinks))
 
     def _refuse(self, error: Exception) -> None:
         self.refused = f"{type(error).__name__}: {error}"
@@ -85,11 +85,22 @@ class Fused:
         )
 
 
-class _Plan:
-    """A traced function, compiled, with fresh output arrays for every call."""
+def _write(function: Function, sources: tuple[Source, ...], sinks: Any) -> None:
+    """Call a function of numpy and copy its arrays into sinks."""
+    for made, sink in zip(function(*sources), sinks, strict=True):
+        for key, array in sink.items():
+            array[...] = made[key]
+
+
+class _Loop:
+    """Traced function as a compiled loop; copies and pickles hold its source alone."""
 
     def __init__(
-        self, function: Function, sources: tuple[Source, ...], plain: tuple[Sink, ...]
+        self,
+        function: Function,
+        sources: tuple[Source, ...],
+        plain: tuple[Sink, ...],
+        name: str,
     ) -> None:
         tape = Tape()
         arrays: dict[tuple[int, str], Array] = {}
@@ -102,7 +113,7 @@ class _Plan:
                     row[key] = tape.array((i, key), value[0])
             symbolic.append(row)
         writer = Writer(tape, {name: a.dtype for name, a in arrays.items()})
-        kinds: list[tuple[tuple[int, ...], Any]] = []
+        outputs: list[tuple[tuple[int, ...], Any]] = []
         for sink, real in zip(function(*symbolic), plain, strict=True):
             writer.begin_sink()
             for key, out in sink.items():
@@ -111,50 +122,58 @@ class _Plan:
                 if place.shape != shape:
                     raise ValueError(f"{key} has shape {place.shape} in a single world")
                 writer.store(key, place, dtype)
-                kinds.append((shape, dtype))
-        self._count = next(iter(arrays))
-        loaded = load(writer.source(len(sources)))
-        self._kernel = loaded.kernel
-        self._call: Call = loaded.module.call
+                outputs.append((shape, dtype))
+        self._name, self._counted = name, next(iter(arrays))
+        self._source = writer.source(len(sources))
         self._inputs = list(writer.inputs)
         self._kinds = [arrays[name].dtype for name in writer.inputs]
-        self._kinds += [dtype for _, dtype in kinds]
-        self._pool = BufferPool(kinds)
-        self._copied = False
-        """Whether some array is not as at the first call (rows one behind the other,
-        the same type) and must be copied."""
+        self._kinds += [dtype for _, dtype in outputs]
+        self._pool = BufferPool(outputs)
+        self._loaded: Loaded | None = None
+        self._load()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_loaded": None}
+
+    def _load(self) -> Loaded:
+        if self._loaded is None:
+            self._loaded = load(self._source, self._name)
+        return self._loaded
 
     def __call__(self, sources: tuple[Source, ...]) -> tuple[Sink, ...]:
-        """Call the loop."""
-        i, key = self._count
-        outputs = self._pool.take(len(sources[i][key]))
-        if self._copied:
-            return self._call(self._copying, outputs, *sources)
+        """Call the loop with freshly allocated outputs."""
+        kernel, module = self._loaded or self._load()
+        i, key = self._counted
+        rows = len(sources[i][key])
+        outputs = self._pool.take(rows)
+        if spreads(rows):
+            kernel = self._spread
         try:
-            if spreads(len(sources[i][key])):
-                return self._call(self._spread, outputs, *sources)
-            return self._call(self._kernel, outputs, *sources)
+            return module.call(kernel, outputs, *sources)  # type: ignore[no-any-return]
         except TypeError:
-            self._copied = True
-            return self._call(self._copying, outputs, *sources)
+            return module.call(self._copying, outputs, *sources)  # type: ignore[no-any-return]
 
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
         """See `Fused.stage`."""
         given = [sources[i][key] for i, key in self._inputs]
         outputs = [array for sink in sinks for array in sink.values()]
-        kinds = [array.dtype for array in (*given, *outputs)]
-        if kinds != self._kinds:
-            raise NotCompilable(f"arrays are {kinds}, the loop is for {self._kinds}")
-        return Stage(self._kernel, (*given, *outputs))
+        return Stage(self._load().kernel, (*given, *outputs))
 
     def _copying(self, *arrays: Array) -> None:
-        """The loop, on copies where need be; TypeError where a number would suffer."""
+        """Call the loop on copies of what is not contiguous or of another type.
+
+        Raises:
+            TypeError: a copy would lose precision.
+        """
         pairs = zip(arrays, self._kinds, strict=True)
-        self._kernel(*[a.astype(k, "C", "safe", copy=False) for a, k in pairs])
+        kernel = self._load().kernel
+        kernel(*[a.astype(k, "C", "safe", copy=False) for a, k in pairs])
 
     def _spread(self, *arrays: Array) -> None:
+        kernel = self._load().kernel
+
         def work(rows: slice) -> None:
-            self._kernel(*[array[rows] for array in arrays])
+            kernel(*[array[rows] for array in arrays])
 
         over_rows(work, len(arrays[0]))
 

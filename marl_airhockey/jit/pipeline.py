@@ -1,50 +1,60 @@
-"""Compiled functions called one after the other, by one call, on arrays that stay.
+"""Pipeline: functions called one after the other on arrays that stay.
 
 Calling compiled code from Python costs some 50 ns for every array, and making an array
-as much again: for one world, that is more than all the arithmetic. A chain looks up the
-addresses of its arrays once.
+as much again: for one world, that is more than all the arithmetic. So neighbouring
+stages that are compiled become one compiled function, which looks its arrays up by
+address. Stages in plain Python run between them. Both give the same numbers.
 """
 
 from __future__ import annotations
 
-import hashlib
+import os
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
-from pathlib import Path
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 from numba.core import cgutils
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
-from marl_airhockey.jit.codegen import load
+from marl_airhockey.jit.codegen import load, package_hash
+from marl_airhockey.jit.threads import LEAST, over_rows
 from marl_airhockey.types import Array
 
 
-class NotCompilable(Exception):
-    """Why something is no stage of a chain."""
-
-
 class Fixed(NamedTuple):
-    """An array that all worlds share."""
+    """Array that all worlds share."""
 
     array: Array
 
 
 class Stage(NamedTuple):
-    """A compiled function, and what it is called with."""
+    """Function and the arguments that it is called with at every step."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    """Arrays (B, *), `Fixed` ones, and numbers"""
+    """Arrays (B, *), `Fixed` ones, and numbers; anything for a function of Python"""
     stops: bool = False
-    """Whether it returns False where the chain must end"""
+    """True if it returns False where the pipeline must end"""
+
+    def __call__(self) -> bool:
+        """Call the function; False if the pipeline must end."""
+        given = [a.array if isinstance(a, Fixed) else a for a in self.arguments]
+        going = self.function(*given)
+        return bool(going) if self.stops else True
+
+    @property
+    def compiled(self) -> bool:
+        """True if numba compiles the function, and compiling is not switched off."""
+        off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0"
+        return isinstance(self.function, Dispatcher) and not off
 
 
 @intrinsic
 def pointer(_: Any, address: Any) -> Any:
-    """An address, as numba's `carray` takes it."""
+    """Turn an address into the pointer that numba's `carray` takes."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], cgutils.voidptr_t)
@@ -53,41 +63,70 @@ def pointer(_: Any, address: Any) -> Any:
 
 
 class Pipeline:
-    """Stages as one compiled function.
+    """Stages of a step, called in their order.
 
     Args:
         rows: B.
-        turns: lists of stages that differ in nothing but their arrays; a call takes
-            one of them.
+        stages: of a step; their arrays must stay where they are.
+        name: of what is done, for the line that says that it is being compiled.
     """
 
-    def __init__(self, rows: int, *turns: Sequence[Stage]) -> None:
-        self._rows, self._turns = rows, turns
-        """Turns are kept, as the tables hold the addresses of their arrays."""
-        self._tables = [
-            np.array([array.ctypes.data for array in _arrays(stages)], np.int64)
-            for stages in turns
-        ]
-        functions = {f"f{i}": stage.function for i, stage in enumerate(turns[0])}
-        self._kernel = load(_source(turns[0]), functions).kernel
+    def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
+        self._parts: list[Stage | _Compiled] = []
+        for compiled, group in groupby(stages, lambda stage: stage.compiled):
+            part = list(group)
+            if compiled:
+                self._parts.append(_Compiled(rows, part, name))
+            else:
+                self._parts.extend(part)
 
-    def __call__(self, turn: int) -> bool:
-        """Call all stages of a turn, or those up to one that stops it: False."""
-        return bool(self._kernel(self._tables[turn], self._rows))
+    def __call__(self) -> bool:
+        """Call all stages, or those up to one that stops: False."""
+        # A loop, as a generator would cost more than the calls.
+        for part in self._parts:
+            if not part():
+                return False
+        return True
 
 
-def _arrays(stages: Sequence[Stage]) -> Iterator[Array]:
-    """The arrays of all arguments."""
+class _Compiled:
+    """Stages as one compiled function, which several threads may share by rows."""
+
+    def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
+        self._rows, self._stages = rows, stages
+        """Stages are kept, as the addresses are those of their arrays."""
+        arrays = list(_arrays(stages))
+        self._addresses = np.array([a.ctypes.data for a, _ in arrays], np.int64)
+        self._strides = np.array([s * a.strides[0] for a, s in arrays], np.int64)
+        functions = {f"f{i}": stage.function for i, stage in enumerate(stages)}
+        self._kernel = load(_source(stages), name, functions).kernel
+
+    def __call__(self) -> bool:
+        if self._rows < 2 * LEAST:
+            return bool(self._kernel(self._addresses, self._rows))
+        going: list[bool] = []
+
+        def work(rows: slice) -> None:
+            first, end, _ = rows.indices(self._rows)
+            where = self._addresses + first * self._strides
+            going.append(bool(self._kernel(where, end - first)))
+
+        over_rows(work, self._rows)
+        return all(going)
+
+
+def _arrays(stages: Sequence[Stage]) -> Iterator[tuple[Array, int]]:
+    """Yield the arrays of all arguments, and 1 for those that have rows, else 0."""
     for stage in stages:
         for argument in stage.arguments:
             array = argument.array if isinstance(argument, Fixed) else argument
             if isinstance(array, np.ndarray):
                 assert array.flags.c_contiguous, "rows must lie one behind the other"
-                yield array
+                yield array, int(array is argument)
 
 
 def _source(stages: Sequence[Stage]) -> str:
-    """The module of a chain, the same for any number of worlds."""
+    """Write the module of a pipeline, the same for any number of worlds."""
     views: list[str] = []
     calls: list[str] = []
     for i, stage in enumerate(stages):
@@ -108,7 +147,8 @@ def _source(stages: Sequence[Stage]) -> str:
         calls += [f"if not {call}:", "    return False"] if stage.stops else [call]
     lines = [
         '"""Written by marl_airhockey.jit.pipeline; may be deleted at any time."""',
-        f"# {_version()}",
+        # What numba keeps of a pipeline holds the code of the functions that it calls.
+        f"# {package_hash()}",
         *(f"# f{i}: {_called(stage.function)}" for i, stage in enumerate(stages)),
         "import numpy as np",
         "from numba import carray",
@@ -123,10 +163,3 @@ def _source(stages: Sequence[Stage]) -> str:
 
 def _called(function: Any) -> str:
     return f"{function.py_func.__module__}.{function.py_func.__qualname__}"
-
-
-@cache
-def _version() -> str:
-    """Of the package's sources: what numba keeps of a chain holds their code."""
-    files = sorted(Path(__file__).parents[1].rglob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()

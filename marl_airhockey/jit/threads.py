@@ -1,4 +1,4 @@
-"""Rows of worlds on several threads, for loops that let go of Python's lock.
+"""Threads for rows of worlds, used by loops that release Python's lock.
 
 MARL_AIRHOCKEY_THREADS says how many threads there may be (1). They sleep while there is
 nothing to do, so that they take nothing from others.
@@ -13,12 +13,12 @@ from functools import cache
 from itertools import pairwise
 
 LEAST = 2048
-"""Rows of cheap worlds that a thread is worth."""
+"""Rows of cheap worlds that pay for a thread."""
 
 
 @cache
 def threads() -> int:
-    """How many threads there may be.
+    """Return the largest number of threads.
 
     Raises:
         ValueError: MARL_AIRHOCKEY_THREADS is no whole number above 0.
@@ -32,7 +32,7 @@ def threads() -> int:
 
 
 def use_threads(number: int | None) -> int | None:
-    """Let there be so many threads, here and in processes that begin here.
+    """Set the number of threads, here and in processes that begin here.
 
     Raises:
         ValueError: fewer than one.
@@ -61,7 +61,7 @@ def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> N
     Args:
         work: done for a slice.
         rows: how many there are.
-        least: rows that a thread is worth.
+        least: rows that pay for a thread.
     """
     parts = min(threads(), rows // least)
     if parts < 2:
@@ -74,5 +74,5 @@ def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> N
 
 
 def spreads(rows: int) -> bool:
-    """Whether so many rows go to more than one thread."""
+    """Tell whether so many rows go to more than one thread."""
     return threads() > 1 and rows >= 2 * LEAST

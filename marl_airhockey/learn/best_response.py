@@ -9,7 +9,7 @@ import numpy as np
 from marl_airhockey.evaluation.games import play
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_driver, make_scenario
+from marl_airhockey.registry import make_agent, make_scenario
 from marl_airhockey.toolkit.policies import load_policy
 
 GAMES = 400
@@ -42,7 +42,7 @@ def best_response(
     response = load_policy(folder / "last.zip")
     found = play(
         scenario,
-        [response, make_driver(player)],
+        [response, make_agent(player)],
         lineups,
         SEED,
         {"backend": "numba"},

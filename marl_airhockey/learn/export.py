@@ -17,7 +17,7 @@ from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
 from marl_airhockey.learn.network import freeze
 from marl_airhockey.learn.run import Progress
-from marl_airhockey.registry import make_driver, make_scenario
+from marl_airhockey.registry import make_agent, make_scenario
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.toolkit.policies import Policy, frozen_policy
 
@@ -79,7 +79,7 @@ def _games(policy: Policy, config: TrainConfig) -> dict[str, Any]:
     score, _ = challenge(
         config.scenario,
         policy,
-        [make_driver(rival) for rival in config.rivals],
+        [make_agent(rival) for rival in config.rivals],
         GAMES,
         TEST_SEED,
         {**config.keywords, "drivers": {}},

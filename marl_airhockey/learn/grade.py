@@ -8,7 +8,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import challenge
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.world.build import Keywords
 
 EVAL_SEED = 1_000_000
@@ -54,7 +54,7 @@ def _scores(seat: Seat, config: TrainConfig) -> Grades:
     score, margin = challenge(
         config.scenario,
         seat(True),
-        [make_driver(rival) for rival in config.rivals],
+        [make_agent(rival) for rival in config.rivals],
         config.eval_episodes,
         EVAL_SEED,
         keywords,

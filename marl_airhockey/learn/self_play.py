@@ -12,7 +12,7 @@ from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.evaluation.games import teams_of
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.make import make_sb3_vec
-from marl_airhockey.registry import make_driver
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.toolkit.policies import frozen_policy
 from marl_airhockey.types import Array
@@ -69,7 +69,7 @@ class Arena(AirHockeyVecEnv):
         self._rng = np.random.default_rng(seed)
         self._roster = Roster(self.world)
         for name in scripts:
-            self._roster.add(name, make_driver(name))
+            self._roster.add(name, make_agent(name))
         self._scripts = len(scripts)
         self._scores = np.full(self._scripts, 0.5)
         self._snapshots: list[Path] = []

@@ -44,8 +44,8 @@ class Handicap(Driver):
         self.control_dt = self.inner.control_dt or 0.05
         self._late = round(self.reaction / self.control_dt)
 
-    def start(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        memory = self.inner.start(seat, rng, worlds)
+    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+        memory = self.inner.reset(seat, rng, worlds)
         return {**memory, "waiting": np.zeros((worlds, self._late, 2))}
 
     def act(

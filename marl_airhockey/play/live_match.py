@@ -17,7 +17,6 @@ from marl_airhockey.registry import (
     agent_names,
     find_backend,
     make_agent,
-    make_driver,
     make_scenario,
     zoo_names,
 )
@@ -141,7 +140,7 @@ class Court:
         name, world = self.who[i], self.world
         driver = self._hands[i]
         if name != PERSON:
-            driver = self.fairness.hold(make_driver(name))
+            driver = self.fairness.hold(make_agent(name))
         return Driven(i, driver, world.observer, 1, world.control_dt)
 
     def seat(self, i: int, name: str) -> None:
@@ -207,7 +206,7 @@ class Court:
     def _start_drivers(self, seats: Iterable[int]) -> None:
         one, world = np.zeros(1, np.int64), self.world
         for i in seats:
-            self._driven[i].start(one, world.seeds, world.episode.number)
+            self._driven[i].reset(one, world.seeds, world.episode.number)
 
     def rehearse(self) -> None:
         """Play half a second for nobody, so that all loops are compiled by then."""

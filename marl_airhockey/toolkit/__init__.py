@@ -1,1 +1,40 @@
-"""What scenario and agent files are made with."""
+"""Toolkit: all that scenario and agent files are made with, in one import."""
+
+from __future__ import annotations
+
+from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.observable import Observable
+from marl_airhockey.contracts.scenario import GoalScenario, Scenario, Transition
+from marl_airhockey.core.errors import require, unknown_name
+from marl_airhockey.core.geometry import clip, length
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
+from marl_airhockey.core.seat import Seat
+from marl_airhockey.core.state import State
+from marl_airhockey.core.table import Table
+from marl_airhockey.types import Array, Memory
+
+__all__ = [
+    "Array",
+    "Driver",
+    "GoalLine",
+    "GoalScenario",
+    "Mark",
+    "Memory",
+    "Observable",
+    "Obstacle",
+    "PrescribedMotion",
+    "RandomStreams",
+    "Scenario",
+    "Scene",
+    "Seat",
+    "State",
+    "Table",
+    "Transition",
+    "View",
+    "clip",
+    "length",
+    "require",
+    "unknown_name",
+]

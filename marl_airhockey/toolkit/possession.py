@@ -1,9 +1,10 @@
-"""Possession: see the definitions."""
+"""Possession: who has a puck, who touched it last, and pucks that lie."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from marl_airhockey.contracts.scenario import Transition
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import reaches
@@ -29,28 +30,31 @@ def last_toucher(who: Array, after: State) -> Array:
     return who
 
 
-def held(scene: Scene, old: Array, before: State, after: State) -> Array:
-    """(..., seats, pucks) s that a puck has been in reach of a seat or of a mate's."""
-    dt = (after.time - before.time)[..., None, None]
-    has = in_reach(scene, after.puck)
+def held(scene: Scene, t: Transition) -> Array:
+    """(..., seats, pucks) s that a puck has been in reach of a seat or of a mate's.
+
+    It goes on from ``held`` of the memory.
+    """
+    dt = (t.after.time - t.before.time)[..., None, None]
+    has = in_reach(scene, t.after.puck)
     teams = np.array([seat.team for seat in scene.seats])
     rows = [has[..., teams == seat.team].any(-1) for seat in scene.seats]
     ours = np.stack(rows, axis=-2)
-    return np.where(ours, old + dt, 0.0)
+    return np.where(ours, t.memory["held"] + dt, 0.0)
 
 
-def lying(old: Array, clocks: Array, before: State, after: State) -> Array:
+def lying(t: Transition, clocks: Array) -> Array:
     """(..., pucks) s that a puck has lain, slower than 0.05 m/s, out of every reach.
 
+    It goes on from ``lying`` of the memory.
+
     Args:
-        old: before the step.
-        clocks: what `held` gave after it.
-        before: the step.
-        after: the step.
+        t: the step.
+        clocks: result of `held` for it.
     """
-    dt = (after.time - before.time)[..., None]
-    lies = (length(after.puck_velocity) < SLOW) & ~(clocks > 0.0).any(-2)
-    return np.where(lies, old + dt, 0.0)
+    dt = (t.after.time - t.before.time)[..., None]
+    lies = (length(t.after.puck_velocity) < SLOW) & ~(clocks > 0.0).any(-2)
+    return np.where(lies, t.memory["lying"] + dt, 0.0)
 
 
 def in_reach(scene: Scene, point: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What scenarios share when they judge a step: touches, entries, regularising terms.
+"""Rewards: measures of a step that scenarios share; touches, lifts and possession too.
 
 All functions are pure and vectorised over whatever leading axes the caller has.
 """
@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from marl_airhockey.contracts.scenario import Transition
 from marl_airhockey.core.geometry import length as length
-from marl_airhockey.core.state import State
 from marl_airhockey.core.touches import count_touches as count_touches
 from marl_airhockey.core.touches import no_touches as no_touches
 from marl_airhockey.core.touches import touched as touched
@@ -20,7 +20,7 @@ from marl_airhockey.toolkit.possession import held as held
 from marl_airhockey.toolkit.possession import in_reach as in_reach
 from marl_airhockey.toolkit.possession import last_toucher as last_toucher
 from marl_airhockey.toolkit.possession import lying as lying
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.types import Array
 
 
 def tolerance(value: Array, bound: float, margin: float) -> Array:
@@ -36,14 +36,17 @@ def tolerance(value: Array, bound: float, margin: float) -> Array:
     return np.exp(-np.maximum(value - bound, 0.0) / margin)
 
 
-def nearest(memory: Memory, after: State) -> Array:
+def nearest(t: Transition) -> Array:
     """(...) shortest distance of paddle 0 to puck 0 up to the first touch, m.
 
-    What it shrank by is the reward for going to the puck; being a best so far, it
-    cannot be farmed by going to and fro.
+    It goes on from ``gap`` of the memory. What it shrank by is the reward for going to
+    the puck; being a best so far, it cannot be farmed by going to and fro.
     """
-    gap = length(after.puck[..., 0, :] - after.paddle[..., 0, :])
-    return np.where(touched(memory), memory["gap"], np.minimum(memory["gap"], gap))
+    gap, old = (
+        length(t.after.puck[..., 0, :] - t.after.paddle[..., 0, :]),
+        t.memory["gap"],
+    )
+    return np.where(touched(t.new_memory), old, np.minimum(old, gap))
 
 
 def gained(old: Array, new: Array) -> Array:
@@ -71,9 +74,7 @@ def alike(
 
 
 def enters(
-    memory: Memory,
-    before: State,
-    after: State,
+    t: Transition,
     centre: Array,
     radius: float,
     velocity: Array | None = None,
@@ -87,9 +88,7 @@ def enters(
     home).
 
     Args:
-        memory: of `count_touches`, before this step.
-        before: the state before the step.
-        after: the state after it, with ``path`` (..., K + 1, movers, 4).
+        t: the step; the state after it has a ``path`` (..., K + 1, movers, 4).
         centre: (..., 2) of the circle, m.
         radius: of the circle, m.
         velocity: (..., 2) wanted velocity in the circle, m/s; None for any.
@@ -104,13 +103,14 @@ def enters(
     Raises:
         ValueError: a state without a path.
     """
+    after = t.after
     if after.path is None:
         raise ValueError("enters: the scene must ask for the path (path=True)")
     puck = after.path[..., after.bodies.paddles, :]
-    dt = (after.time - before.time)[..., None]
+    dt = (after.time - t.before.time)[..., None]
     moment = dt * np.linspace(0.0, 1.0, puck.shape[-2])
     contact = np.where(after.touched > 0, after.touched_at, np.inf).min((-1, -2))
-    counts = touched(memory)[..., None] | (moment >= contact[..., None] - 1e-9)
+    counts = touched(t.new_memory)[..., None] | (moment >= contact[..., None] - 1e-9)
     counts &= puck[..., 2] > 0
     gap = length(puck[..., :2] - centre[..., None, :]) - radius
     gap = np.where(counts, gap, np.inf)

@@ -8,6 +8,7 @@ from numba import njit
 from marl_airhockey.core.physics import PARAMETERS
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.toolkit.starts import falling_puck, roll
 from marl_airhockey.types import Array
@@ -46,8 +47,26 @@ def legal_shots(rng: RandomStreams, scene: Scene) -> tuple[Array, Array]:
     raise RuntimeError("start: no legal shot in 100 pucks")
 
 
+def shots_at(rng: RandomStreams, scene: Scene, state: State) -> Array:
+    """Draw for each puck 0 of a state a moment of a legal shot at it, as `legal_shots`.
+
+    A puck at which none was found in 100 tries gets a moment of a shot at another one.
+
+    Returns:
+        (W, 4) x, y, vx, vy of the moment.
+    """
+    _, goals = legal_shots(rng, scene)
+    pucks = np.concatenate([state.puck[:, 0], state.puck_velocity[:, 0]], -1)
+    open_rows = np.arange(len(rng))
+    for _ in range(100):
+        goal, found = _shoot(rng.select(open_rows), pucks[open_rows], scene)
+        goals[open_rows[found]] = goal[found]
+        open_rows = open_rows[~found]
+    return goals
+
+
 def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]:
-    """One shot at each puck: a random goal moment (W, 4), and whether there is one."""
+    """Shoot once at each puck: a random goal moment (W, 4), and whether there is one."""
     table, physics = scene.table, {k: p.default for k, p in PARAMETERS.items()}
     physics.update(scene.defaults)
     ways = (
@@ -63,15 +82,15 @@ def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]
     rows = np.arange(len(rng))
 
     fall = roll(puck[:, :2], puck[:, 2:], SECONDS, *ways)
-    met = fall[rows, (fall[..., 0] <= height[:, None]).argmax(-1)]
+    struck = fall[rows, (fall[..., 0] <= height[:, None]).argmax(-1)]
     normal = np.stack([np.cos(angle), np.sin(angle)], -1)
-    paddle = met[:, :2] - normal * (table.paddle_radius + table.puck_radius)
-    legal = (met[:, 0] <= height) & (np.abs(paddle[:, 1]) <= 0.24)
+    paddle = struck[:, :2] - normal * (table.paddle_radius + table.puck_radius)
+    legal = (struck[:, 0] <= height) & (np.abs(paddle[:, 1]) <= 0.24)
     legal &= (paddle[:, 0] >= -0.74) & (paddle[:, 0] <= -0.38)
 
-    closing = (met[:, 2:] * normal).sum(-1) - push
+    closing = (struck[:, 2:] * normal).sum(-1) - push
     bounce = (1 + physics["paddle_restitution"]) * closing
-    path = roll(met[:, :2], met[:, 2:] - bounce[:, None] * normal, SECONDS, *ways)
+    path = roll(struck[:, :2], struck[:, 2:] - bounce[:, None] * normal, SECONDS, *ways)
     moment = np.empty(len(rows), np.int64)
     _choose(path, table.size[0] / 2 - table.puck_radius, choice, moment)
     return path[rows, moment], legal & (closing < 0) & (moment >= 0)
@@ -79,13 +98,13 @@ def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]
 
 @njit(cache=True)
 def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
-    """A random good moment of each path (W, T, 4) while it rises; -1 if none is."""
+    """Pick a good moment of each path (W, T, 4) while it rises; -1 if there is none."""
     steep = np.tan(np.radians(30.0))
     for w in range(len(path)):
         good, moment[w] = 0, -1
         # Twice: the first time to count the good moments, the second to take one.
-        for turn in range(2):
-            wanted, count = int(choice[w] * good) if turn else -1, 0
+        for take in range(2):
+            wanted, count = int(choice[w] * good) if take else -1, 0
             for t in range(path.shape[1]):
                 x, y = path[w, t, 0], path[w, t, 1]
                 vx, vy = path[w, t, 2], path[w, t, 3]

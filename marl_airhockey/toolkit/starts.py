@@ -11,7 +11,7 @@ from numba import njit
 from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State, still_state
+from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)
@@ -19,7 +19,9 @@ PADDLE_Y = (-0.10, 0.10)
 """m: where a single paddle starts unless its scenario says otherwise."""
 
 
-def place(rng: RandomStreams, x: tuple[float, float], y: tuple[float, float]) -> Array:
+def uniform_box(
+    rng: RandomStreams, x: tuple[float, float], y: tuple[float, float]
+) -> Array:
     """(W, 2) points uniform in a box of the standard table, m."""
     low, high = _corners(x, y)
     return rng.uniform(low, high, 2)
@@ -31,26 +33,17 @@ def _corners(x: tuple[float, float], y: tuple[float, float]) -> tuple[Array, Arr
     return low, high
 
 
-def first_state(scene: Scene, worlds: int) -> State:
-    """Rows with everything at the origin, at rest; obstacles at their places."""
-    state = still_state(scene.bodies, worlds, len(scene.goal_lines))
-    first = scene.bodies.movers
-    for i, obstacle in enumerate(scene.obstacles):
-        state.position[:, first + i] = obstacle.start
-    return state
-
-
 def falling_puck(rng: RandomStreams) -> tuple[Array, Array]:
     """A puck on its way down from the far half: (W, 2) position and velocity."""
-    position = place(rng, (0.4, 0.8), (-0.2, 0.2))
-    velocity = place(rng, (-1.0, -0.2), (-0.3, 0.3))
+    position = uniform_box(rng, (0.4, 0.8), (-0.2, 0.2))
+    velocity = uniform_box(rng, (-1.0, -0.2), (-0.3, 0.3))
     return position, velocity
 
 
 def falling(rng: RandomStreams, scene: Scene) -> State:
     """One paddle at home and every puck falling from the far half, none on another."""
-    state = first_state(scene, len(rng))
-    state.position[:, 0] = place(rng, PADDLE_X, PADDLE_Y)
+    state = scene.still_state(len(rng))
+    state.position[:, 0] = uniform_box(rng, PADDLE_X, PADDLE_Y)
     first = scene.bodies.puck.start
     for k in range(first, scene.bodies.puck.stop):
         others = state.position[:, first:k]

@@ -9,12 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from marl_airhockey.contracts.observable import Observable
-from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables as observables
-from marl_airhockey.toolkit import rewards, starts
+from marl_airhockey.toolkit import observables, rewards, starts
 from marl_airhockey.types import Array, Memory
 
 
@@ -64,35 +63,36 @@ class Versus(Scenario):
         """(seats,) 0 at home, 1 at the far end."""
         return np.array([seat.team for seat in self.scene.seats])
 
-    def start(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        seats, pucks = len(self.lineup), self.pucks
-        state = starts.first_state(self.scene, worlds)
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = self.scene.still_state(worlds)
         for i, (side, y) in enumerate(self.lineup):
             state.paddle[:, i] = (0.7 * self.table_geometry.offsets[0] * (side - 1), y)
         toward = np.where(rng.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
-        for k in range(pucks):
+        for k in range(self.pucks):
             starts.serve(rng, state, k, toward + k * np.pi)
-        return state, {
-            **rewards.no_touches(worlds, seats, pucks),
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        worlds, seats, pucks = len(rng), len(self.lineup), self.pucks
+        return {
+            **super().initial_memory(state, rng),
             "goals": np.zeros((worlds, 2)),
             "held": np.zeros((worlds, seats, pucks)),
             "lying": np.zeros((worlds, pucks)),
             "serve": np.zeros((worlds, pucks)),
         }
 
-    def update_memory(
-        self, memory: Memory, before: State, command: Array, after: State
-    ) -> Memory:
-        home, far = after.crossed[..., 0], after.crossed[..., 1]
-        held = rewards.held(self.scene, memory["held"], before, after)
+    def update_memory(self, t: Transition) -> Memory:
+        home, far = t.after.crossed[..., 0], t.after.crossed[..., 1]
+        held = rewards.held(self.scene, t)
         foul = held >= self.possession - 1e-9
-        lying = rewards.lying(memory["lying"], held, before, after)
+        lying = rewards.lying(t, held)
         toward = 1.0 * (far | foul[..., 0, :]) - 1.0 * (home | foul[..., -1, :])
         again = (toward == 0.0) & (lying >= 1.0 - 1e-9)
-        nearer = np.where(after.puck[..., 0] < 0.0, -1.0, 1.0)
+        nearer = np.where(t.after.puck[..., 0] < 0.0, -1.0, 1.0)
         serve = np.where(again, nearer, toward)
         return {
-            "goals": memory["goals"] + after.crossed[..., ::-1].sum(-2),
+            "goals": t.memory["goals"] + t.after.crossed[..., ::-1].sum(-2),
             "held": np.where((serve != 0.0)[..., None, :], 0.0, held),
             "lying": np.where(serve != 0.0, 0.0, lying),
             "serve": serve,
@@ -108,33 +108,30 @@ class Versus(Scenario):
             observables.PossessionTime(self.possession),
         )
 
-    def reward_terms(
-        self, before: State, command: Array, after: State, old: Memory, new: Memory
-    ) -> dict[str, Array]:
-        scored = new["goals"] - old["goals"]
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
+        scored = t.new_memory["goals"] - t.memory["goals"]
         return {"goal": (scored - scored[..., ::-1])[..., self.teams]}
 
-    def terminated(self, after: State, memory: Memory) -> Array:
-        return np.asarray((memory["goals"] >= self.goals_to_win).any(-1))
+    def terminated(self, t: Transition) -> Array:
+        return np.asarray((t.new_memory["goals"] >= self.goals_to_win).any(-1))
 
-    def restart(
-        self, rng: RandomStreams, after: State, memory: Memory
-    ) -> tuple[Array, State, Memory] | None:
-        worlds = np.flatnonzero(memory["serve"].any(-1))
-        if not len(worlds):
-            return None
-        rows, some = after.map(lambda x: x[worlds]), rng.select(worlds)
-        toward = memory["serve"][worlds]
+    def needs_serve(self, t: Transition) -> Array:
+        return np.asarray((t.new_memory["serve"] != 0.0).any(-1))
+
+    def serve(
+        self, rng: RandomStreams, state: State, memory: Memory
+    ) -> tuple[State, Memory]:
+        toward = memory["serve"]
         for k in range(self.pucks):
             heading = np.where(toward[:, k] > 0.0, 0.0, np.pi)
-            starts.serve(some, rows, k, heading, toward[:, k] != 0.0)
-        return worlds, rows, {name: value[worlds] for name, value in memory.items()}
+            starts.serve(rng, state, k, heading, toward[:, k] != 0.0)
+        return state, memory
 
     def caption(self, memory: Memory) -> str:
         return "goals " + " : ".join(f"{goals:.0f}" for goals in memory["goals"])
 
-    def success(self, after: State, memory: Memory) -> Array:
-        goals = memory["goals"]
-        over = (after.time >= self.seconds - 1e-9)[..., None]
-        won = (goals >= self.goals_to_win) | (over & (goals > goals[..., ::-1]))
+    def success(self, t: Transition) -> Array:
+        goals = t.new_memory["goals"]
+        ahead = t.last[..., None] & (goals > goals[..., ::-1])
+        won = (goals >= self.goals_to_win) | ahead
         return np.asarray(won[..., self.teams])

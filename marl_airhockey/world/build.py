@@ -1,4 +1,4 @@
-"""Build: see the definitions."""
+"""Builder of worlds from the keywords that all environments share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.physics import Physics, Value
 from marl_airhockey.jit.threads import threads
-from marl_airhockey.registry import find_backend, make_driver, make_scenario
+from marl_airhockey.registry import (
+    DEFAULT_BACKEND,
+    find_backend,
+    make_agent,
+    make_scenario,
+)
 from marl_airhockey.world.world import World
 
 if TYPE_CHECKING:
@@ -46,7 +51,7 @@ def build_world(
         num_worlds: B.
         autoreset: whether worlds begin anew where an episode ended.
         keywords: all optional.
-            backend: name of the physics ("pymunk").
+            backend: name of the physics ("numba").
             drivers: drivers of seats by agent: names, paths of policies, or objects;
                 the other seats are open.
             seats: "robot" or "arcade".
@@ -75,7 +80,7 @@ def build_world(
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
     game = find_scenario(scenario, keywords)
     scene = game.scene
-    name = keywords.get("backend", "pymunk")
+    name = keywords.get("backend", DEFAULT_BACKEND)
     kind = find_backend(name)
     reason = kind.supports(scene)
     if reason:
@@ -93,7 +98,7 @@ def build_world(
     for agent, driver in keywords.get("drivers", {}).items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
-        built = make_driver(driver) if isinstance(driver, str) else driver
+        built = make_agent(driver) if isinstance(driver, str) else driver
         drivers[agents.index(agent)] = built
     return World(
         game,

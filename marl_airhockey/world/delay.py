@@ -1,4 +1,4 @@
-"""Delay: see the definitions."""
+"""Delay: values as they were some time ago."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from marl_airhockey.types import Array
 
 Rows = Array | slice
 """Some of the worlds: indices (W,), or all of them."""
-
-
 ALL = slice(None)
 
 
 class Delay:
-    """Values as they were some time ago, interpolated between control steps.
+    """Delay line of values of B worlds, interpolated between control steps.
 
     Args:
         longest: the largest delay, s.
@@ -29,12 +27,12 @@ class Delay:
         self.depth = int(np.ceil(longest / control_dt - 1e-9)) + 1
         self._past = np.zeros((shape[0], self.depth, *shape[1:]))
 
-    def fill(self, rows: Rows, past: Array) -> None:
-        """Begin anew in some worlds with what came before, (W, depth, ...)."""
+    def fill(self, rows: Rows, past: Array | float) -> None:
+        """Begin anew in some worlds with the past (W, depth, ...)."""
         self._past[rows] = past
 
     def push(self, value: Array, delay: Array, rows: Rows = ALL) -> Array:
-        """Take the newest value (W, ...) and give that of ``delay`` (W,) s ago."""
+        """Take the newest value (W, ...) and return that of ``delay`` (W,) s ago."""
         past = np.concatenate([self._past[rows][:, 1:], value[:, None]], axis=1)
         self._past[rows] = past
         back = delay / self.control_dt

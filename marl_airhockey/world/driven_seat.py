@@ -1,4 +1,4 @@
-"""Seats that are driven inside the environment, each by a driver."""
+"""Driven seats: seats inside the environment, each with a driver."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from marl_airhockey.world.delay import ALL, Rows
 from marl_airhockey.world.observer import Observer
 
 
-class Driven:
-    """One driven seat of B worlds: its driver, the driver's memory and pace.
+class DrivenSeat:
+    """Driven seat of B worlds: its driver, the driver's memory and pace.
 
     Raises:
         ValueError: a driver whose control_dt is no multiple of the environment's.
@@ -32,7 +32,7 @@ class Driven:
         self.index, self.driver, self._observer = index, driver, observer
         scene = observer.scenario.scene
         self._seat = scene.seats[index]
-        self._turn = scene.table.rotation(self._seat.side)
+        self._rotation = scene.table.rotation(self._seat.side)
         own = driver.control_dt or control_dt
         self.every = round(own / control_dt)
         if self.every < 1 or abs(self.every * control_dt - own) > 1e-9:
@@ -48,12 +48,16 @@ class Driven:
         self._memory: dict[str, Array] = {}
         driver.__enter__()
 
-    def start(self, worlds: Array, seeds: Array, episodes: Array) -> None:
-        """Begin an episode in some worlds, by index."""
+    def reset(self, worlds: Array, seeds: Array, episodes: Array) -> None:
+        """Begin an episode in some worlds, by index, with random streams of its own."""
         self._rng.renew(worlds, seeds, episodes, f"driver {self.index}")
+        self.begin(worlds)
+
+    def begin(self, worlds: Array) -> None:
+        """Begin with a new memory in some worlds, by index."""
         self._held[worlds] = 0.0
         rng = self._rng.select(worlds)
-        rows = self.driver.start(self._seat, rng, len(worlds))
+        rows = self.driver.reset(self._seat, rng, len(worlds))
         for name, row in rows.items():
             if name not in self._memory:
                 shape = (self._num_worlds, *row.shape[1:])
@@ -61,7 +65,7 @@ class Driven:
             self._memory[name][worlds] = row
 
     def measured(self) -> Array | None:
-        """(B, 4) where the paddle is, if the driver tells it."""
+        """Return (B, 4) where the paddle is, if the driver prescribes its motion."""
         return self.driver.measured()
 
     def act(
@@ -72,7 +76,7 @@ class Driven:
         cycles: Array,
         worlds: Rows = ALL,
     ) -> Array:
-        """The asked velocity in some worlds, (W, 2) fractions in the ego frame."""
+        """Return the actions in some worlds, (W, 2) fractions in the ego frame."""
         due, held = cycles[worlds] % self.every == 0, self._held[worlds]
         if not due.any():
             return held
@@ -100,13 +104,13 @@ class Driven:
         physics: dict[str, Array],
         worlds: Rows = ALL,
     ) -> View:
-        """What the driver sees in some worlds, all arrays being theirs."""
+        """Return the view of the driver in some worlds, rows of these alone."""
         seats, want = np.array([self.index]), self.driver.observe
         shown = self._observer.read(sensed, memory, seats, want, worlds)
         ego = sensed
-        if self._turn[0, 0] != 1.0:
-            turned = (x @ self._turn.T for x in (sensed.position, sensed.velocity))
-            position, velocity = turned
+        if self._rotation[0, 0] != 1.0:
+            position = sensed.position @ self._rotation.T
+            velocity = sensed.velocity @ self._rotation.T
             ego = replace(sensed, position=position, velocity=velocity)
         return View(
             scene=self._observer.scenario.scene,

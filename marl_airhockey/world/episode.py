@@ -1,9 +1,8 @@
-"""What a step gives, and the counters of the running episodes."""
+"""Episode: the counters of running episodes, and the result of a step."""
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields, replace
 
 from marl_airhockey.types import Array
 from marl_airhockey.world.observer import Observation
@@ -11,7 +10,7 @@ from marl_airhockey.world.observer import Observation
 
 @dataclass
 class StepResult:
-    """What a step of B worlds gives, for its open seats; arrays (B, ...)."""
+    """Result of a step of B worlds for its open seats; arrays (B, ...), yours."""
 
     observation: Observation
     reward: Array
@@ -23,12 +22,11 @@ class StepResult:
     terms: dict[str, Array]
     """Reward terms by name, (B, open) each"""
     applied_action: Array
-    """(B, open, 2) what acted: velocity as a fraction of top speed, ego frame"""
+    """(B, open, 2) command as a fraction of top speed, ego frame"""
     violation: Array
-    """(B, seats, 5) by how much what was asked exceeded the limits, see
-    `limits.EXCESS`"""
+    """(B, seats, 5) excess of the action over the limits, see `limits.VIOLATIONS`"""
     cost: Array
-    """(B, open) the excesses in units of their limits, summed"""
+    """(B, open) violations in units of their limits, summed"""
     success: Array
     """(B, open) bool, latched for the episode"""
     first_shot: Array
@@ -38,7 +36,7 @@ class StepResult:
     None if none ended or worlds do not restart by themselves"""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Episode:
     """Counters of the running episodes, (B, ...) each."""
 
@@ -52,17 +50,19 @@ class Episode:
     """(B, seats) latched"""
     first_shot: Array
     """(B,) latched"""
-    physics: dict[str, Array] = field(default_factory=dict)
+    physics: dict[str, Array]
     """Physical parameters, (B,) each"""
 
     def counted(self, counters: dict[str, Array]) -> Episode:
-        """The same with other counters."""
-        new = copy(self)
-        vars(new).update(counters)
-        return new
+        """Return the same with other arrays for some counters."""
+        return replace(self, **counters)  # type: ignore[arg-type]
 
     def copied(self) -> Episode:
-        """The same with arrays of its own, but for the physics."""
-        return self.counted(
-            {k: v.copy() for k, v in vars(self).items() if k != "physics"}
-        )
+        """Return the same with arrays of its own, but for the physics."""
+        names = [f.name for f in fields(self) if f.name != "physics"]
+        return self.counted({name: getattr(self, name).copy() for name in names})
+
+    def begin(self, worlds: Array, cycles: Array | int = 0) -> None:
+        """Set the counters of some worlds, by index, to those of a new episode."""
+        self.cycles[worlds], self.returns[worlds] = cycles, 0.0
+        self.success[worlds], self.first_shot[worlds] = False, False

@@ -1,8 +1,9 @@
-"""What seats are shown: layouts of pieces, dicts of goals, or pictures."""
+"""Observer: shows sensed states to seats, as arrays, dicts of goals, or pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -28,10 +29,10 @@ PIXELS = 84
 
 
 class Observer:
-    """Shows sensed states to seats, in the form that each of them wants.
+    """Observer of sensed states for all seats, in the form that each of them wants.
 
     Args:
-        scenario: lists the pieces.
+        scenario: lists the observables.
         sensor: keeps the history.
         physics: tells the top speed.
         observe: the form for open seats, see `layout.OBSERVE`.
@@ -47,7 +48,7 @@ class Observer:
         self.prepare(observe)
 
     def prepare(self, observe: str) -> ObservationLayout:
-        """The layout of a form; pictures have that of velocities beside them."""
+        """Return the layout of a form; pictures have that of velocities beside them."""
         if observe not in OBSERVE:
             raise ValueError(unknown_name("observe", observe, OBSERVE))
         self.sensor.keeps_history |= observe != "velocity"
@@ -64,7 +65,7 @@ class Observer:
 
     @property
     def layout(self) -> ObservationLayout:
-        """The layout of the open seats' observations."""
+        """Layout of the open seats' observations."""
         return self._layouts[self.observe]
 
     def read(
@@ -75,7 +76,7 @@ class Observer:
         observe: str | None = None,
         worlds: Rows = ALL,
     ) -> Observation:
-        """Observations of some seats, in their order.
+        """Return observations of some seats, in their order, freshly allocated.
 
         Args:
             sensed: the sensed state of W worlds, table frame.
@@ -93,7 +94,7 @@ class Observer:
         return self.take(shown, seats)
 
     def take(self, shown: Sink, seats: Array) -> Observation:
-        """The observations of some seats, of what is shown to all."""
+        """Return the observations of some seats from those of all, which it takes over."""
         if len(seats) != len(self.scenario.scene.seats):
             shown["flat"] = shown["flat"][:, seats]
         if len(shown) == 1:
@@ -102,9 +103,9 @@ class Observer:
         return {"observation": flat, **shown}
 
     def show(self, state: State, memory: Memory) -> Sink:
-        """What all seats are shown of a state that is sensed as it is.
+        """Return the observations of all seats from the true state.
 
-        Empty where it takes more than that: a sensor, the past, or a picture.
+        An empty dict if they need the sensor, a history or pixels (`read` is used then).
         """
         if self.observe != "velocity" or not self.sensor.ideal:
             return {}
@@ -113,7 +114,7 @@ class Observer:
     def _flat(
         self, layout: ObservationLayout, state: State, memory: Memory, history: Array
     ) -> Sink:
-        """What reads a layout, and the goals beside it."""
+        """Return the numbers of a layout, and the goals beside it."""
         game = self.scenario
         shown = {"flat": layout.read(EgoView(state, memory, history, layout.scope))}
         if game.goals == "dict" and isinstance(game, GoalScenario):
@@ -126,12 +127,38 @@ class Observer:
         return shown
 
     def _compiled(self, layout: ObservationLayout) -> Fused:
-        """The same as one loop over the worlds."""
+        """Return `_flat` of sources, as one loop over the worlds."""
+        return Fused(partial(self._show, layout), self.scenario.name)
 
-        def show(sensed: Source, memory: Memory, sensor: Source) -> tuple[Sink]:
-            return (self._flat(layout, State(**sensed), memory, sensor["history"]),)
+    def _show(
+        self, layout: ObservationLayout, sensed: Source, memory: Memory, sensor: Source
+    ) -> tuple[Sink]:
+        return (self._flat(layout, State(**sensed), memory, sensor["history"]),)
 
-        return Fused(show, f"the observation of {self.scenario.name!r}")
+    def renewed(
+        self,
+        observation: Observation,
+        sensed: State,
+        memory: Memory,
+        seats: Array,
+        worlds: Array,
+    ) -> Observation:
+        """Return a copy of an observation with that of some worlds read anew.
+
+        Args:
+            observation: of all worlds.
+            sensed: the sensed state of all worlds, table frame.
+            memory: the scenario's, of all worlds.
+            seats: (n,) indices of seats.
+            worlds: (W,) indices.
+        """
+        rows = sensed.map(lambda x: x[worlds])
+        kept = {name: array[worlds] for name, array in memory.items()}
+        fresh = self.read(rows, kept, seats, worlds=worlds)
+        if isinstance(observation, np.ndarray):
+            return _merged(observation, worlds, np.asarray(fresh))
+        parts = dict(fresh)
+        return {k: _merged(v, worlds, parts[k]) for k, v in observation.items()}
 
     def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
         from marl_airhockey.world.pixels import small_picture
@@ -148,3 +175,10 @@ class Observer:
                         scene, world[k], goal, turn, int(seat), PIXELS
                     )
         return out
+
+
+def _merged(array: Array, worlds: Array, rows: Array) -> Array:
+    """Return a copy in which some worlds, by index, hold ``rows``."""
+    merged = array.copy()
+    merged[worlds] = rows
+    return merged

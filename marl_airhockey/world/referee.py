@@ -1,4 +1,4 @@
-"""Judges a step of B worlds and shows what came of it, in one loop over the worlds."""
+"""Referee: applies the rules to a step and shows what came of it, in one loop."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.state import State
 from marl_airhockey.jit.fused import Fused, Sink, Source
 from marl_airhockey.jit.pipeline import Stage
@@ -17,26 +17,52 @@ from marl_airhockey.world.episode import Episode
 
 
 class Verdict(NamedTuple):
-    """What a step means, (B, ...) arrays that nobody else holds."""
+    """Verdict on a step, (B, ...) arrays."""
 
     memory: Memory
     terms: dict[str, Array]
     """Reward terms by name, (B, seats) each"""
     counters: dict[str, Array]
-    """The new arrays of `Episode`, by name"""
+    """New counters of `Episode`, by name"""
     outcome: dict[str, Array]
-    """``reward`` (B, seats), ``terminated``, ``truncated`` (B,), and ``sent``
-    (B, seats, 2) as fractions of top speed in ego frames, float32"""
+    """``reward`` (B, seats), ``terminated``, ``truncated``, ``serves`` (B,), if the
+    game serves, and ``applied_action`` (B, seats, 2) float32: fractions of top speed in
+    ego frames"""
     shown: dict[str, Array]
-    """What every seat sees of the state as it is; see `observer.Observer.show`"""
+    """Observation of every seat from the true state; see `Observer.show`"""
+
+
+class Step(NamedTuple):
+    """Arrays that a verdict is made from."""
+
+    before: State
+    command: Array
+    """(B, seats, 2) m/s, table frame"""
+    after: State
+    memory: Memory
+    """Memory of before the step"""
+    episode: Episode
+    """Counters of before the step"""
+    limit: Array
+    """(B,) control steps after which the clock ends an episode"""
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Sources of the compiled rules."""
+        action = {"command": self.command, "limit": self.limit}
+        episode = self.episode
+        return (
+            *(vars(self.before), vars(self.after), self.memory),
+            *(vars(episode), episode.physics, action),
+        )
 
 
 Show = Callable[[State, Memory], Sink]
-"""What is shown of a state and a memory, to every seat."""
+"""Function that shows a state and a memory to every seat."""
 
 
 class Referee:
-    """Applies the rules of a scenario to a step and keeps the score of its episode.
+    """Rules of a scenario, and the score of its episodes.
 
     Args:
         scenario: whose rules.
@@ -45,56 +71,23 @@ class Referee:
     """
 
     def __init__(self, scenario: Scenario, rotations: Array, show: Show) -> None:
-        self._scenario, self._show = scenario, show
+        self.scenario, self._show = scenario, show
         self._rotations = rotations
         self._straight = bool((rotations == np.eye(2)).all())
-        self._fused = Fused(self._judge, f"the judging of {scenario.name!r}")
+        self._fused = Fused(self._judge, scenario.name)
 
     @property
     def refused(self) -> str | None:
-        """Why the rules run as plain numpy, if they do."""
+        """Reason why the rules run as plain numpy; None if they are compiled."""
         return self._fused.refused
 
-    def judge(
-        self,
-        before: State,
-        sent: Array,
-        after: State,
-        memory: Memory,
-        episode: Episode,
-        limit: Array,
-    ) -> Verdict:
-        """The verdict on a step.
+    def prepare(self, step: Step) -> Verdict:
+        """Compile the rules for arrays like these; return the verdict, fresh arrays."""
+        return Verdict(*self._fused.prepare(*step.sources))
 
-        Args:
-            before: the step.
-            command: (B, seats, 2) m/s, table frame.
-            after: the step.
-            memory: before the step.
-            episode: its counters before the step.
-            limit: (B,) control steps after which the clock ends an episode.
-        """
-        return Verdict(
-            *self._fused(*_sources(before, sent, after, memory, episode, limit))
-        )
-
-    def stage(
-        self,
-        before: State,
-        sent: Array,
-        after: State,
-        memory: Memory,
-        episode: Episode,
-        limit: Array,
-        verdict: Verdict,
-    ) -> Stage:
-        """The same from and into arrays that stay, the last being those of a verdict.
-
-        Raises:
-            Unchained: the rules are not compiled for such arrays.
-        """
-        sources = _sources(before, sent, after, memory, episode, limit)
-        return self._fused.stage(sources, verdict)
+    def stage(self, step: Step, verdict: Verdict) -> Stage:
+        """Return the rules from a step into a verdict whose arrays stay."""
+        return self._fused.stage(step.sources, verdict)
 
     def _judge(
         self,
@@ -105,15 +98,15 @@ class Referee:
         physics: Source,
         action: Source,
     ) -> tuple[Sink, ...]:
-        game, before, after = self._scenario, State(**first), State(**last)
-        sent = action["sent"]
-        new = game.next_memory(memory, before, sent, after)
-        terms = game.all_reward_terms(before, sent, after, memory, new)
-        terminated = game.is_terminated(after, new)
-        success = game.is_success(after, new)
+        game, before, after = self.scenario, State(**first), State(**last)
+        command, cycles = action["command"], episode["cycles"] + 1
+        over = cycles >= action["limit"]
+        t = Transition(before, command, after, memory, memory, over)
+        t = t._replace(new_memory=game.next_memory(t))
+        terms, terminated = game.all_reward_terms(t), game.is_terminated(t)
+        success = game.is_success(t)
         if success.ndim == after.time.ndim:
             success = success[..., None]
-        cycles = episode["cycles"] + 1
         reward = reduce(np.add, terms.values(), 0.0 * episode["returns"])
         counters = {
             "cycles": cycles,
@@ -122,35 +115,19 @@ class Referee:
         }
         if "touches" in memory:
             fresh = counters["success"].any(-1) & ~episode["success"].any(-1)
-            few = new["touches"].sum((-1, -2)) <= 1
+            few = t.new_memory["touches"].sum((-1, -2)) <= 1
             counters["first_shot"] = episode["first_shot"] | (fresh & few)
-        turned = sent
+        rotated = command
         if not self._straight:
-            turned = (self._rotations @ sent[..., None])[..., 0]
-        share = turned / physics["paddle_speed"][..., None, None]
+            rotated = (self._rotations @ command[..., None])[..., 0]
+        share = rotated / physics["paddle_speed"][..., None, None]
         outcome = {
             "reward": reward,
             "terminated": terminated,
-            "truncated": (cycles >= action["limit"]) & ~terminated,
-            "sent": share.astype(np.float32),
+            "truncated": over & ~terminated,
+            "applied_action": share.astype(np.float32),
         }
-        return new, terms, counters, outcome, self._show(after, new)
-
-
-def _sources(
-    before: State,
-    sent: Array,
-    after: State,
-    memory: Memory,
-    episode: Episode,
-    limit: Array,
-) -> tuple[Source, ...]:
-    action = {"sent": sent, "limit": limit}
-    return (
-        vars(before),
-        vars(after),
-        memory,
-        vars(episode),
-        episode.physics,
-        action,
-    )
+        serves = game.needs_serve(t)
+        if serves is not None:
+            outcome["serves"] = serves & ~terminated & ~over
+        return t.new_memory, terms, counters, outcome, self._show(after, t.new_memory)

@@ -6,7 +6,7 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.types import Array
-from marl_airhockey.world.driven_seat import Driven
+from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.world import World
 
 
@@ -20,16 +20,18 @@ class Roster:
     def __init__(self, world: World) -> None:
         self.world = world
         self.names: list[str] = []
-        self._places: list[list[Driven]] = []
+        self._seats: list[list[DrivenSeat]] = []
         self.seated = np.full((world.num_worlds, len(world.scene.seats)), -1)
         """(B, seats) which player sits where, by number; -1 for none of them."""
 
     def add(self, name: str, driver: Driver) -> int:
         """The number of a new player."""
         world = self.world
-        self._places.append(
+        self._seats.append(
             [
-                Driven(seat, driver, world.observer, world.num_worlds, world.control_dt)
+                DrivenSeat(
+                    seat, driver, world.observer, world.num_worlds, world.control_dt
+                )
                 for seat in range(len(world.scene.seats))
             ]
         )
@@ -39,19 +41,19 @@ class Roster:
     def replace(self, player: int, name: str, driver: Driver) -> None:
         """Give a player's number to another; take it off all seats first."""
         self.add(name, driver)
-        self._places[player], self.names[player] = self._places.pop(), self.names.pop()
+        self._seats[player], self.names[player] = self._seats.pop(), self.names.pop()
 
     def begin(self, worlds: Array) -> None:
         """Begin an episode in some worlds, by index: after they restarted."""
         seeds, episodes = self.world.seeds, self.world.episode.number
         for player, seat, rows in self._sitting(worlds):
-            self._places[player][seat].start(rows, seeds, episodes)
+            self._seats[player][seat].reset(rows, seeds, episodes)
 
     def ask(self, actions: Array) -> None:
         """Fill in (B, seats, 2) what players ask for; other seats are left alone."""
         world = self.world
         for player, seat, rows in self._sitting(np.arange(world.num_worlds)):
-            actions[rows, seat] = self._places[player][seat].act(
+            actions[rows, seat] = self._seats[player][seat].act(
                 world.sensed,
                 world.memory,
                 world.episode.physics,

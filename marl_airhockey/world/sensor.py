@@ -1,4 +1,4 @@
-"""What is sensed of a state: delayed, noisy, held while unseen, and its history.
+"""Sensor: states as a camera sees them, late, noisy, occluded, with their history.
 
 A camera sees pucks and blocks; paddles report themselves, as robots do.
 """
@@ -22,7 +22,7 @@ OCCLUSION_SECONDS = 0.1
 
 
 class Sensor:
-    """Turns states of B worlds into sensed states.
+    """Sensor of B worlds, which turns states into sensed states.
 
     Args:
         scene: who is on the table.
@@ -38,23 +38,25 @@ class Sensor:
         self.ideal = not any(physics.highest(name) for name in names)
         self.control_dt = control_dt
         self.camera = slice(scene.bodies.paddles, scene.bodies.movers)
-        """The bodies that the camera sees."""
+        """Bodies that the camera sees."""
         self.pucks = scene.bodies.pucks
         things = (num_worlds, self.camera.stop - self.camera.start, 2)
         self.delay = Delay(physics.highest("observation_delay"), control_dt, things)
-        self._place, self._speed = np.zeros(things), np.zeros(things)
+        self._position, self._speed = np.zeros(things), np.zeros(things)
         self._visible = np.ones((num_worlds, self.pucks), np.bool_)
         self.history = np.zeros((num_worlds, HISTORY, self.pucks, 3))
         """(B, HISTORY, pucks, 3) sensed x, y and visibility, newest last."""
         self.frames = np.zeros((num_worlds, FRAMES, len(scene.bodies), 2))
         """(B, FRAMES, N, 2) sensed positions of all bodies, newest last."""
         self.keeps_history = False
-        """Whether `history` and `frames` are kept: only if anybody looks at them."""
+        """True if `history` and `frames` are kept: only if an observation needs them."""
 
-    def start(
+    def reset(
         self, worlds: Array, state: State, values: dict[str, Array], rng: RandomStreams
     ) -> State:
-        """Begin an episode in some worlds and sense its first state.
+        """Begin an episode in some worlds and return its first sensed state.
+
+        The past is that of bodies that have moved at their velocities.
 
         Args:
             worlds: (W,) their indices.
@@ -63,11 +65,12 @@ class Sensor:
             rng: the sensor's streams.
         """
         if not self.ideal:
-            position, velocity = (x[worlds, self.camera] for x in _motion(state))
+            position = state.position[worlds, self.camera]
+            velocity = state.velocity[worlds, self.camera]
             ago = np.arange(self.delay.depth, 0, -1)[:, None, None] * self.control_dt
             self.delay.fill(worlds, position[:, None] - velocity[:, None] * ago)
             late = values["observation_delay"][worlds] + self.control_dt
-            self._place[worlds] = position - velocity * late[:, None, None]
+            self._position[worlds] = position - velocity * late[:, None, None]
             self._visible[worlds] = True
         sensed = self.sense(state, values, rng, worlds)
         if self.keeps_history:
@@ -82,14 +85,14 @@ class Sensor:
         rng: RandomStreams,
         rows: Rows = ALL,
     ) -> State:
-        """The sensed state; ``rows`` tells in which worlds time has gone on."""
+        """Return the sensed state; time has passed in the worlds ``rows`` alone."""
         if self.ideal and not self.keeps_history:
             return state
         sensed = state
         if not self.ideal:
             self._look(state, values, rng.select(rows), rows)
-            position, velocity = (x.copy() for x in _motion(state))
-            position[:, self.camera] = self._place
+            position, velocity = state.position.copy(), state.velocity.copy()
+            position[:, self.camera] = self._position
             velocity[:, self.camera] = self._speed
             sensed = replace(
                 state,
@@ -107,26 +110,22 @@ class Sensor:
     def _look(
         self, state: State, values: dict[str, Array], rng: RandomStreams, rows: Rows
     ) -> None:
-        """Update what the camera makes of the bodies in some worlds."""
+        """Update the sensed positions and speeds of the bodies in some worlds."""
         true = state.position[rows, self.camera]
-        place = self.delay.push(true, values["observation_delay"][rows], rows)
+        position = self.delay.push(true, values["observation_delay"][rows], rows)
         noise = values["position_noise"][rows][:, None, None]
-        place += noise * rng.normal(*place.shape[1:])
-        last = self._place[rows]
+        position += noise * rng.normal(*position.shape[1:])
+        last = self._position[rows]
         visible = self._unhidden(values["occlusion"][rows], rng, rows)
         held = ~visible[..., None]
-        np.copyto(place[:, : self.pucks], last[:, : self.pucks], where=held)
-        self._speed[rows] = (place - last) / self.control_dt
-        self._place[rows] = place
+        np.copyto(position[:, : self.pucks], last[:, : self.pucks], where=held)
+        self._speed[rows] = (position - last) / self.control_dt
+        self._position[rows] = position
         self._visible[rows] = visible
 
     def _unhidden(self, share: Array, rng: RandomStreams, rows: Rows) -> Array:
-        """Occlusions as a two-state Markov chain with the wanted share of time."""
+        """Draw occlusions as a two-state Markov chain with the wanted share of time."""
         end = min(self.control_dt / OCCLUSION_SECONDS, 1.0)
         begin = (end * share / (1 - share))[:, None]
         luck = rng.uniform(0.0, 1.0, self.pucks)
         return np.where(self._visible[rows], luck >= begin, luck < end)
-
-
-def _motion(state: State) -> tuple[Array, Array]:
-    return state.position, state.velocity

@@ -1,15 +1,54 @@
-"""How paddles move and meet: one law for every 2D backend."""
+"""Paddles: how they follow their commands and meet, one law for every 2D backend."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
+from marl_airhockey.contracts.backend import MAX_PRESCRIBED_SPEED
 from marl_airhockey.types import Array
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def follow(
+    velocity: Array,
+    prescribed: Array,
+    position: Array,
+    dt: float,
+    goal: Array,
+    imposed: Array,
+    lifted: Array,
+) -> None:
+    """Find how fast paddles go, which of them are prescribed, and which are lifted.
+
+    Args:
+        velocity: (B, paddles, 2) commanded, m/s.
+        prescribed: (B, paddles, 4) position and velocity at the end of the step, nan
+            for paddles that follow their command.
+        position: (B, N, 2) m, paddles first.
+        dt: of the step, s.
+        goal: (B, paddles, 2) m/s, filled; a prescribed paddle has it all along.
+        imposed: (B, paddles) bool, filled: is prescribed.
+        lifted: (B, paddles) bool, filled: would be faster than any hand, so it is
+            carried above the table.
+    """
+    for b in range(len(goal)):
+        for i in range(goal.shape[1]):
+            whole = True
+            for k in range(4):
+                whole &= bool(np.isfinite(prescribed[b, i, k]))
+            for axis in range(2):
+                goal[b, i, axis] = velocity[b, i, axis]
+                if whole:
+                    distance = prescribed[b, i, axis] - position[b, i, axis]
+                    goal[b, i, axis] = distance / dt
+            speed = np.hypot(goal[b, i, 0], goal[b, i, 1])
+            imposed[b, i] = whole
+            lifted[b, i] = whole and speed > MAX_PRESCRIBED_SPEED
+
+
 @njit(cache=True)
-def drive(
+def ramp_paddles(
     position: Array,
     velocity: Array,
     goal: Array,
@@ -41,21 +80,21 @@ def drive(
             mean[i, axis] = velocity[i, axis] + 0.5 * ramp
             position[i, axis] += mean[i, axis] * dt
             velocity[i, axis] += ramp
-    met = meet(position, velocity, prescribed, lifted, diameter)
+    met = separate_paddles(position, velocity, prescribed, lifted, diameter)
     if met:
         mean[:] = velocity
     return met
 
 
 @njit(cache=True)
-def meet(
+def separate_paddles(
     position: Array, velocity: Array, prescribed: Array, lifted: Array, diameter: float
 ) -> bool:
     """Separate overlapping paddles in place; True if any pair overlapped.
 
     Each goes back by half of the overlap and both take the mean of their normal
-    velocities. A prescribed paddle does not yield: the other goes back by all of it and takes
-    the prescribed one's normal velocity.
+    velocities. A prescribed paddle does not yield: the other goes back by all of it
+    and takes the prescribed one's normal velocity.
 
     Args:
         position: (paddles, 2) m, changed in place.

@@ -54,7 +54,7 @@ def inside(lines: Array, radius: float, x: float, y: float) -> tuple[float, floa
 
 
 @njit(cache=True)
-def slip(
+def slide_out(
     lines: Array, radius: float, x: float, y: float, paddles: Array, touch: float
 ) -> tuple[float, float]:
     """Where a puck goes that paddles squeeze into a wall: away along it.

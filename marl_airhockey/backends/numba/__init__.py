@@ -1,4 +1,4 @@
-"""The 2D table for thousands of worlds."""
+"""Numba backend: the 2D table in one compiled loop."""
 
 from marl_airhockey.backends.numba.backend import make
 

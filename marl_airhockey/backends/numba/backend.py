@@ -1,27 +1,28 @@
-"""The 2D table for thousands of worlds at once: one compiled loop (`kernel`)."""
+"""Numba backend: the 2D table, one world or thousands, in one compiled loop."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from marl_airhockey.backends._planar.walls import sides
-from marl_airhockey.backends.numba.arrays import LAWS, Ground, laws
+from marl_airhockey.backends.numba.arrays import (
+    COEFFICIENTS,
+    Static,
+    make_coefficients,
+)
 from marl_airhockey.backends.numba.kernel import advance
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.core.table import GRAVITY
-from marl_airhockey.jit.buffers import BufferPool
 from marl_airhockey.jit.pipeline import Fixed, Stage
-from marl_airhockey.jit.threads import over_rows, spreads
 from marl_airhockey.types import Array
 
 
 class NumbaBackend(Backend):
-    """B worlds as rows of arrays, stepped by numba."""
+    """B worlds as rows of arrays, stepped by a compiled `kernel.advance`."""
 
     exact: ClassVar[bool] = True
     default_substeps: ClassVar[int] = 10
@@ -30,104 +31,73 @@ class NumbaBackend(Backend):
         self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
     ) -> None:
         super().__init__(scene, num_worlds, control_dt, substeps)
-        bodies = scene.bodies
-        goal_lines = [
-            (goal_line.side, goal_line.width is None) for goal_line in scene.goal_lines
-        ]
+        bodies, b = scene.bodies, num_worlds
+        lines = [(line.side, line.width is None) for line in scene.goal_lines]
         obstacles = [(*o.start, *(o.end or o.start), o.radius) for o in scene.obstacles]
-        self._ground = Ground(
+        self._static = Static(
             bodies.paddles,
             bodies.pucks,
             bodies.blocks,
             np.array(bodies.radius),
             sides(scene),
-            np.array(goal_lines, np.int64).reshape(-1, 2),
+            np.array(lines, np.int64).reshape(-1, 2),
             np.array(obstacles, np.float64).reshape(-1, 5),
             control_dt,
             substeps,
         )
-        self._laws = np.zeros((num_worlds, LAWS))
-        self._last = self._rows(self.rest_state)
-        results = [getattr(self.rest_state, name) for name in RESULTS]
-        self._pool = BufferPool([(array.shape[1:], array.dtype) for array in results])
-        self._leaning = np.zeros((num_worlds, bodies.pucks, len(goal_lines)), np.bool_)
-        self._out = np.zeros((num_worlds, bodies.pucks), np.bool_)
-        self._push = np.zeros((num_worlds, bodies.movers, 2))
+        seats, table_sides = (b, bodies.paddles), len(scene.table.vertices)
+        self._coefficients = np.zeros((b, COEFFICIENTS))
+        self._goal = np.zeros((*seats, 2))
+        self._imposed = np.zeros(seats, np.bool_)
+        self._lifted = np.zeros(seats, np.bool_)
+        self._push = np.zeros((b, bodies.movers, 2))
+        self._against = np.zeros((b, bodies.pucks, table_sides), np.bool_)
+        self._out = np.zeros((b, bodies.pucks), np.bool_)
+        self._pathless = np.zeros((b, 0, bodies.movers, 4))
 
     @classmethod
     def supports(cls, scene: Scene) -> str | None:
         if scene.blocks and scene.block_shape != "disc":
             return 'square blocks are played by backend "pymunk"'
-        if scene.blocks and any(goal_line.width for goal_line in scene.goal_lines):
-            return "blocks could slide into a goal line; leave out one or the other"
+        if scene.blocks and any(line.width for line in scene.goal_lines):
+            return "blocks could slide into a goal; leave out one or the other"
         return None
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         rows = {name: value[worlds] for name, value in values.items()}
         rows["pull"] = GRAVITY * np.sin(np.radians(rows["tilt"]))
-        self._laws[worlds] = laws(rows, self.control_dt, self.substeps)
+        made = make_coefficients(rows, self.control_dt, self.substeps)
+        self._coefficients[worlds] = made
 
-    def start(self, state: State, worlds: Array) -> None:
-        self._last = self._rows(state)
-        self._leaning[worlds] = False
-        self._out[worlds] = False
+    def reset(self, state: State, worlds: Array) -> None:
+        super().reset(state, worlds)
         self._push[worlds] = 0.0
+        self._out[worlds] = False
+        self._against[worlds] = self._touching_walls(state.puck[worlds])
 
-    @staticmethod
-    def _rows(state: State) -> tuple[Array, ...]:
-        return state.position, state.velocity, state.touching, state.time
-
-    def step(self, command: Command) -> State:
-        results = self._pool.take(self.num_worlds)
-        moved: dict[str, Any] = dict(zip(RESULTS, results, strict=True))
-        path = np.empty(self._path_shape)
-        if self.scene.path:
-            moved["path"] = path
-        state = self.rest_state.replaced(moved)
-        closed = self._open if command.closed is None else command.closed
-        orders = (*self._follow(command, self._last[0]), closed)
-        arrays = self._arrays(orders, self._last, path, results)
-        if spreads(self.num_worlds):
-
-            def work(rows: slice) -> None:
-                advance(*self._ground, *[array[rows] for array in arrays])
-
-            over_rows(work, self.num_worlds)
-        else:
-            advance(*self._ground, *arrays)
-        if command.prescribed is not None:
-            prescribed = orders[1]
-            state.velocity[:, : prescribed.shape[1]][prescribed] = command.prescribed[
-                prescribed
-            ][:, 2:]
-        self._last = self._rows(state)
-        return state
-
-    def _arrays(
-        self,
-        orders: tuple[Array, ...],
-        last: tuple[Array, ...],
-        path: Array,
-        results: Sequence[Array],
-    ) -> tuple[Array, ...]:
-        """All arrays that `advance` works on, but for those that worlds share."""
-        position, velocity, time, *happened = results
-        return (
-            *(self._laws, *orders, *last),
-            *(position, velocity, path, self._push, time),
-            *(*happened, self._leaning, self._out),
+    def _touching_walls(self, puck: Array) -> Array:
+        """(W, pucks, sides) bool: the puck (W, pucks, 2) touches that side's wall."""
+        lines, radius = self._static.lines, self.scene.table.puck_radius
+        normals, offsets, middles, half = np.split(lines, (2, 3, 5), axis=1)
+        ahead = puck @ normals.T + offsets[:, 0]
+        from_middle = puck[..., None, :] - middles
+        aside = (
+            normals[:, 0] * from_middle[..., 1] - normals[:, 1] * from_middle[..., 0]
         )
+        return np.asarray((ahead < radius) & (np.abs(aside) >= half[:, 0]))
 
-    def stage(self, goal: Array, before: State, after: State) -> Stage:
-        orders = (goal, self._nobody, self._nobody, self._open)
-        path = after.path if after.path is not None else np.empty(self._path_shape)
-        results = [getattr(after, name) for name in RESULTS]
-        arrays = self._arrays(orders, self._rows(before), path, results)
-        ground = (Fixed(x) if isinstance(x, np.ndarray) else x for x in self._ground)
-        return Stage(advance, (*ground, *arrays))
-
-    def finish(self, goal: Array, after: State) -> None:
-        self._last = self._rows(after)
+    def stage(self, command: Command, before: State, after: State) -> Stage:
+        static = [Fixed(x) if isinstance(x, np.ndarray) else x for x in self._static]
+        names = ("position", "velocity", "angle", "spin", "touching", "time")
+        arguments = (
+            *(*static, self._coefficients, *command),
+            *(self._goal, self._imposed, self._lifted),
+            *(getattr(before, name) for name in names),
+            *(getattr(after, name) for name in RESULTS),
+            self._pathless if after.path is None else after.path,
+            *(self._push, self._against, self._out),
+        )
+        return Stage(advance, arguments)
 
 
 make = NumbaBackend

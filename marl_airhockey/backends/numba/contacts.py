@@ -1,9 +1,9 @@
-"""The laws of the kernel: how discs meet walls, goal lines, obstacles, each other.
+"""Contacts of discs with walls, goal lines, obstacles and each other.
 
-They are Chipmunk's, written for discs: positions move first, a contact sees the
-velocity from before the pull of the slope, and takes an overlap back in the next
-substep. Functions of plain numbers, so that a compiler keeps them in registers: metres,
-m/s. A contact is its depth (above 0 if they touch) and its unit normal.
+The laws are Chipmunk's, written for discs: positions move first, a contact sees the
+velocity from before the pull of the slope, and corrects an overlap in the next substep.
+Functions of plain numbers, so that a compiler keeps them in registers: metres, m/s. A
+contact is its depth (above 0 if they touch) and its unit normal.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ SLOP = 1e-4
 
 @njit(cache=True, error_model="numpy")
 def bounce(before: float, now: float, restitution: float) -> float:
-    """The normal speed that a contact adds.
+    """Return the normal speed that a contact adds, m/s.
 
     Args:
         before: normal speed before this substep's forces; below 0 if closing.
         now: the same after them.
-        restitution: share of the closing speed that is given back.
+        restitution: share of the closing speed that is returned.
     """
     return max(-(restitution * before + now), 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def take_back(depth: float, taken: float) -> float:
-    """What is to be added to the way that takes an overlap back, m."""
+def penetration_correction(depth: float, taken: float) -> float:
+    """Return the distance to add to the correction of an overlap, m."""
     return max(depth - SLOP - taken, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def meet_disc(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
-    """Two discs, the second (dx, dy) from the first: depth and normal toward it."""
+def contact_disc(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
+    """Return depth and normal of two discs, the second (dx, dy) from the first."""
     square = dx * dx + dy * dy
     if square >= reach * reach:
         return -1.0, 1.0, 0.0
@@ -48,10 +48,10 @@ def meet_disc(dx: float, dy: float, reach: float) -> tuple[float, float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def meet_side(
+def contact_side(
     x: float, y: float, radius: float, lines: Array, s: int
 ) -> tuple[float, float, float]:
-    """A disc and side ``s`` of `rails.sides`, with a goal line in its middle."""
+    """Return depth and normal of a disc and side ``s`` of `walls.sides`."""
     nx, ny = lines[s, 0], lines[s, 1]
     ahead = nx * x + ny * y + lines[s, 2]
     if ahead >= radius:
@@ -62,39 +62,39 @@ def meet_side(
         return radius - ahead, nx, ny
     # In the goal line: its nearer post or, behind the line, the wall beside it.
     gap = aside - (half if aside >= 0.0 else -half)
-    depth, along, across = meet_disc(gap, max(ahead, 0.0), radius)
+    depth, along, across = contact_disc(gap, max(ahead, 0.0), radius)
     return depth, across * nx - along * ny, across * ny + along * nx
 
 
 @njit(cache=True, error_model="numpy")
-def through(x: float, y: float, lines: Array, s: int) -> bool:
-    """Whether a centre has passed the goal line in side ``s`` of `rails.sides`."""
+def passes_line(x: float, y: float, lines: Array, s: int) -> bool:
+    """Tell whether a centre has passed the goal line in side ``s`` of `walls.sides`."""
     nx, ny = lines[s, 0], lines[s, 1]
     aside = nx * (y - lines[s, 4]) - ny * (x - lines[s, 3])
     return bool(nx * x + ny * y + lines[s, 2] < 0.0 and abs(aside) < lines[s, 5])
 
 
 @njit(cache=True, error_model="numpy")
-def meet_obstacle(
+def contact_obstacle(
     x: float, y: float, radius: float, obstacles: Array, o: int
 ) -> tuple[float, float, float]:
-    """A disc and a fixed disc or rounded segment, a row x, y, x, y, radius."""
+    """Return depth and normal of a disc and an obstacle, a row x, y, x, y, radius."""
     ax, ay = obstacles[o, 0], obstacles[o, 1]
     lx, ly = obstacles[o, 2] - ax, obstacles[o, 3] - ay
     square = lx * lx + ly * ly
     share = ((x - ax) * lx + (y - ay) * ly) / square if square > 0.0 else 0.0
     share = min(max(share, 0.0), 1.0)
     dx, dy = x - ax - share * lx, y - ay - share * ly
-    return meet_disc(dx, dy, radius + obstacles[o, 4])
+    return contact_disc(dx, dy, radius + obstacles[o, 4])
 
 
 @njit(cache=True, error_model="numpy")
-def rub(speed: float, loss: float) -> float:
-    """Coulomb friction: the share of a speed that is left after ``loss`` m/s."""
+def friction_share(speed: float, loss: float) -> float:
+    """Return the share of a speed that Coulomb friction of ``loss`` m/s leaves."""
     return (speed - loss) / speed if speed > loss else 0.0
 
 
 @njit(cache=True, error_model="numpy")
 def cap(speed: float, most: float) -> float:
-    """The share of a speed that is left so that it is at most ``most``."""
+    """Return the share of a speed that leaves at most ``most``."""
     return most / speed if speed > most else 1.0

@@ -1,7 +1,7 @@
-"""The 2D table: one control step of B worlds in one compiled loop.
+"""Kernel of the 2D table: one control step of B worlds in one compiled loop.
 
-A world in which nothing can meet within the step coasts through it in closed form; any
-other is stepped substep by substep by the laws of `discs`. Both give the same numbers
+A world without a contact in the step flies through it in closed form; any other is
+stepped substep by substep by the laws of `contacts`. Both give the same numbers
 but for rounding, so that most steps cost a few distances.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from marl_airhockey.backends._planar.paddles import meet
-from marl_airhockey.backends._planar.walls import SQUEEZE, slip, wall
+from marl_airhockey.backends._planar.paddles import follow, separate_paddles
+from marl_airhockey.backends._planar.walls import SQUEEZE, slide_out, wall
 from marl_airhockey.backends.numba.arrays import (
     BLOCK,
     BLOCK_MASS,
@@ -22,24 +22,28 @@ from marl_airhockey.backends.numba.arrays import (
     PUCK_MASS,
     WALL,
     Batch,
+    Commands,
     Events,
-    Ground,
-    Last,
     Motion,
-    Order,
+    Previous,
+    Static,
 )
 from marl_airhockey.backends.numba.contacts import (
     SLOP,
     bounce,
     cap,
-    meet_disc,
-    meet_obstacle,
-    meet_side,
-    rub,
-    take_back,
-    through,
+    contact_disc,
+    contact_obstacle,
+    contact_side,
+    friction_share,
+    passes_line,
+    penetration_correction,
 )
-from marl_airhockey.backends.numba.free_flight import begin, coast, find_busy
+from marl_airhockey.backends.numba.free_flight import (
+    carry_over,
+    find_collisions,
+    fly_freely,
+)
 from marl_airhockey.core.physics import PUCK_SPEED_CAP
 from marl_airhockey.types import Array
 
@@ -55,78 +59,89 @@ def advance(
     obstacles: Array,
     control_dt: float,
     substeps: int,
-    law: Array,
-    goal: Array,
+    coefficients: Array,
+    command: Array,
     prescribed: Array,
-    lifted: Array,
     closed: Array,
-    last_position: Array,
-    last_velocity: Array,
-    last_touching: Array,
-    last_time: Array,
+    goal: Array,
+    imposed: Array,
+    lifted: Array,
+    previous_position: Array,
+    previous_velocity: Array,
+    previous_angle: Array,
+    previous_spin: Array,
+    previous_touching: Array,
+    previous_time: Array,
     position: Array,
     velocity: Array,
-    path: Array,
-    push: Array,
+    angle: Array,
+    spin: Array,
     time: Array,
     touched: Array,
     touched_at: Array,
     touching: Array,
+    banked: Array,
     crossed: Array,
     crossed_velocity: Array,
-    leaning: Array,
+    path: Array,
+    push: Array,
+    against: Array,
     out: Array,
 ) -> None:
     """Move B worlds by a control step, in place.
 
     Takes the arrays of a `Batch` one by one: numba is slow to take tuples of arrays
-    from Python, and Python to make them.
+    from Python, and Python to make them. ``command``, ``prescribed`` and ``closed`` are
+    those of a `contracts.backend.Command`; the next three are filled.
     """
-    ground = Ground(
-        paddles,
-        pucks,
-        blocks,
-        radius,
-        lines,
-        goal_lines,
-        obstacles,
-        control_dt,
-        substeps,
+    static = Static(
+        *(paddles, pucks, blocks, radius, lines, goal_lines, obstacles),
+        *(control_dt, substeps),
     )
-    order = Order(goal, prescribed, lifted, closed)
-    last = Last(last_position, last_velocity, last_touching, last_time)
-    motion = Motion(position, velocity, path, push, time)
+    follow(command, prescribed, previous_position, control_dt, goal, imposed, lifted)
+    commands = Commands(goal, imposed, lifted, closed)
+    previous = Previous(
+        *(previous_position, previous_velocity, previous_angle, previous_spin),
+        *(previous_touching, previous_time),
+    )
+    motion = Motion(position, velocity, angle, spin, path, push, time)
     events = Events(
-        touched, touched_at, touching, crossed, crossed_velocity, leaning, out
+        *(touched, touched_at, touching, banked, crossed, crossed_velocity),
+        *(against, out),
     )
-    batch = Batch(ground, law, order, last, motion, events)
-    begin(batch)
-    busy = np.ones(len(law), np.bool_)
+    batch = Batch(static, coefficients, commands, previous, motion, events)
+    carry_over(batch)
+    may_collide = np.ones(len(coefficients), np.bool_)
     if motion.path.shape[1] == 0:
-        find_busy(batch, busy)
-        coast(batch, busy)
-    if busy.any():
-        _substeps(batch, busy)
+        find_collisions(batch, may_collide)
+        fly_freely(batch, may_collide)
+    if may_collide.any():
+        _substeps(batch, may_collide)
+    for b in range(len(goal)):
+        for i in range(paddles):
+            if imposed[b, i]:
+                velocity[b, i, 0] = prescribed[b, i, 2]
+                velocity[b, i, 1] = prescribed[b, i, 3]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _substeps(batch: Batch, busy: Array) -> None:
-    """The busy worlds, substep by substep.
+def _substeps(batch: Batch, may_collide: Array) -> None:
+    """Move the worlds that may have contacts, substep by substep.
 
     The inner functions are one phase of a substep each; numba puts them in place, which
     spares it counting references to a dozen arrays at every call.
     """
-    ground, law, order, _, motion, events = batch
-    paddles, pucks, blocks, radius, shared, goal_lines, obstacles, control_dt, n = (
-        ground
-    )
+    static, coefficients, commands, _, motion, events = batch
+    paddles, pucks, blocks, radius, shared, goal_lines, obstacles = static[:7]
+    control_dt, n = static[7:]
     lines = shared.copy()
-    goal, prescribed, lifted, closed = order
-    position, velocity, path, pending, _ = motion
-    touched, touched_at, touching, crossed, crossed_velocity, leaning, out = events
+    goal, prescribed, lifted, closed = commands
+    position, velocity, _, _, path, pending, _ = motion
+    touched, touched_at, touching, banked = events[:4]
+    crossed, crossed_velocity, against, out = events[4:]
     first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
-    # Of one world: places, velocities, those before this substep's forces, ways that
-    # take overlaps back; ramped is what a paddle's velocity has become.
+    # Of one world: positions, velocities, those before this substep's forces,
+    # corrections of overlaps; ramped is a paddle's velocity by now.
     p, v = np.zeros((movers, 2)), np.zeros((movers, 2))
     was, push = np.zeros((movers, 2)), np.zeros((movers, 2))
     ramped = np.zeros((paddles, 2))
@@ -137,11 +152,11 @@ def _substeps(batch: Batch, busy: Array) -> None:
     # make something faster.
     hard = np.zeros((movers * (len(lines) + len(obstacles)), 2), np.int64)
     soft = np.zeros((movers * movers, 2), np.int64)
-    reach = np.zeros(movers)
+    reach, fresh_bank = np.zeros(movers), np.zeros((pucks, len(lines)), np.bool_)
     hards, softs = np.zeros(1, np.int64), np.zeros(1, np.int64)
     fresh, crowd = np.zeros(1, np.bool_), np.zeros(1, np.bool_)
 
-    def enter(b: int, kick: float) -> None:
+    def enter(b: int, leapfrog_offset: float) -> None:
         for m in range(len(goal_lines)):
             side = goal_lines[m, 0]
             lines[side, 5] = 0.0 if closed[b, m] else shared[side, 5]
@@ -150,16 +165,18 @@ def _substeps(batch: Batch, busy: Array) -> None:
                 p[i, axis], v[i, axis] = position[b, i, axis], velocity[b, i, axis]
                 push[i, axis] = pending[b, i, axis]
             if i < paddles:
-                spring[i], away[i] = law[b, PADDLE], lifted[b, i]
+                spring[i], away[i] = coefficients[b, PADDLE], lifted[b, i]
                 for axis in range(2):
                     here, there = v[i, axis], goal[b, i, axis]
                     ramped[i, axis] = there if prescribed[b, i] else here
             elif i < first:
-                weight[i], away[i] = 1.0 / law[b, PUCK_MASS], out[b, i - paddles]
+                weight[i] = 1.0 / coefficients[b, PUCK_MASS]
+                away[i] = out[b, i - paddles]
                 # Half a substep ahead of what is reported (leapfrog).
-                v[i, 0] -= kick
+                v[i, 0] -= leapfrog_offset
             else:
-                weight[i], spring[i] = 1.0 / law[b, BLOCK_MASS], law[b, BLOCK]
+                weight[i] = 1.0 / coefficients[b, BLOCK_MASS]
+                spring[i] = coefficients[b, BLOCK]
 
     def list_near(b: int, left: int) -> None:
         for i in range(movers):
@@ -169,9 +186,9 @@ def _substeps(batch: Batch, busy: Array) -> None:
                 most = max(most, gx * gx + gy * gy)
             shift = np.sqrt(push[i, 0] * push[i, 0] + push[i, 1] * push[i, 1])
             reach[i] = radius[i] + shift
-            reach[i] += (np.sqrt(most) + left * law[b, FALL]) * left * dt
+            reach[i] += (np.sqrt(most) + left * coefficients[b, FALL]) * left * dt
             awake[i] = i < first or most > 0.0 or shift > 0.0
-            awake[i] |= law[b, FALL] > law[b, GRIP]
+            awake[i] |= coefficients[b, FALL] > coefficients[b, GRIP]
         hards[0] = softs[0] = 0
         fresh[0], crowd[0] = True, False
         for i in range(movers):
@@ -186,10 +203,12 @@ def _substeps(batch: Batch, busy: Array) -> None:
                     near = lines[c, 0] * x + lines[c, 1] * y + lines[c, 2] < reach[i]
                 else:
                     o = c - len(lines)
-                    near = meet_obstacle(x, y, reach[i], obstacles, o)[0] > 0.0
+                    near = contact_obstacle(x, y, reach[i], obstacles, o)[0] > 0.0
                 if near:
                     hard[hards[0], 0], hard[hards[0], 1] = i, c
                     hards[0] += 1
+                elif i < first and c < len(lines):
+                    against[b, i - paddles, c] = False
             for j in range(max(i + 1, paddles), movers):
                 dx, dy, most = p[j, 0] - x, p[j, 1] - y, reach[i] + reach[j]
                 near = dx * dx + dy * dy < most * most and (awake[i] or awake[j])
@@ -206,13 +225,15 @@ def _substeps(batch: Batch, busy: Array) -> None:
                 v[i, axis] = ramped[i, axis] + 0.5 * ramp
                 p[i, axis] += v[i, axis] * dt
                 ramped[i, axis] += ramp
-        if crowd[0] and meet(p, ramped, prescribed[b], lifted[b], 2 * radius[0]):
+        if crowd[0] and separate_paddles(
+            p, ramped, prescribed[b], lifted[b], 2 * radius[0]
+        ):
             fresh[0] = False
             for i in range(paddles):
                 v[i, 0], v[i, 1] = ramped[i, 0], ramped[i, 1]
 
     def move(b: int) -> None:
-        fade, fall = law[b, FADE], law[b, FALL]
+        fade, fall = coefficients[b, FADE], coefficients[b, FALL]
         for i in range(movers):
             was[i, 0], was[i, 1] = v[i, 0], v[i, 1]
             if i >= paddles and not away[i]:
@@ -222,43 +243,47 @@ def _substeps(batch: Batch, busy: Array) -> None:
                 v[i, 0], v[i, 1] = v[i, 0] * fade - fall, v[i, 1] * fade
 
     def meet_fixed(b: int) -> None:
+        fresh_bank[:] = False
         for place in range(hards[0]):
             i, c = hard[place, 0], hard[place, 1]
             if c < len(lines):
-                depth, nx, ny = meet_side(p[i, 0], p[i, 1], radius[i], lines, c)
+                depth, nx, ny = contact_side(p[i, 0], p[i, 1], radius[i], lines, c)
             else:
                 o = c - len(lines)
-                depth, nx, ny = meet_obstacle(p[i, 0], p[i, 1], radius[i], obstacles, o)
+                depth, nx, ny = contact_obstacle(
+                    p[i, 0], p[i, 1], radius[i], obstacles, o
+                )
+            if i < first and c < len(lines):
+                k, now = i - paddles, depth > 0.0
+                fresh_bank[k, c] = now and not against[b, k, c]
+                banked[b, k, c] += fresh_bank[k, c]
+                against[b, k, c] = now
             if depth > 0.0:
                 fresh[0] = False
                 before = nx * was[i, 0] + ny * was[i, 1]
-                rest = min(law[b, WALL], spring[i])
+                rest = min(coefficients[b, WALL], spring[i])
                 gain = bounce(before, nx * v[i, 0] + ny * v[i, 1], rest)
-                back = take_back(depth, nx * push[i, 0] + ny * push[i, 1])
+                back = penetration_correction(depth, nx * push[i, 0] + ny * push[i, 1])
                 v[i, 0] += gain * nx
                 v[i, 1] += gain * ny
                 push[i, 0] += back * nx
                 push[i, 1] += back * ny
 
-    def cross(b: int, kick: float) -> None:
+    def pass_lines(b: int, leapfrog_offset: float) -> None:
         for m in range(len(goal_lines)):
             s, whole = goal_lines[m, 0], goal_lines[m, 1] == 1
             for k in range(pucks):
                 i = paddles + k
-                x, y = p[i, 0], p[i, 1]
-                if away[i]:
-                    continue
                 if whole:
-                    ahead = lines[s, 0] * x + lines[s, 1] * y + lines[s, 2]
-                    leans = ahead < radius[i]
-                    began = leans and not leaning[b, k, m]
-                    leaning[b, k, m] = leans
+                    # Crossed by touching the wall, as `meet_fixed` has found.
+                    passed = fresh_bank[k, s]
                 else:
-                    began = through(x, y, lines, s)
-                    out[b, k] = away[i] = began
-                if began:
+                    passed = not away[i] and passes_line(p[i, 0], p[i, 1], lines, s)
+                    if passed:
+                        out[b, k] = away[i] = True
+                if passed:
                     crossed[b, k, m] = True
-                    crossed_velocity[b, k, m, 0] = was[i, 0] + kick
+                    crossed_velocity[b, k, m, 0] = was[i, 0] + leapfrog_offset
                     crossed_velocity[b, k, m, 1] = was[i, 1]
 
     def meet_each_other(b: int, time: float) -> None:
@@ -267,7 +292,7 @@ def _substeps(batch: Batch, busy: Array) -> None:
             depth, nx, ny = -1.0, 1.0, 0.0
             if not (away[i] or away[j]):
                 dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
-                depth, nx, ny = meet_disc(dx, dy, radius[i] + radius[j])
+                depth, nx, ny = contact_disc(dx, dy, radius[i] + radius[j])
             if i < paddles and j < first:
                 k, meets = j - paddles, depth > 0.0
                 if meets and not touching[b, i, k]:
@@ -283,7 +308,7 @@ def _substeps(batch: Batch, busy: Array) -> None:
             now = nx * (v[j, 0] - v[i, 0]) + ny * (v[j, 1] - v[i, 1])
             taken = nx * (push[j, 0] - push[i, 0]) + ny * (push[j, 1] - push[i, 1])
             gain = bounce(before, now, min(spring[i], spring[j]))
-            back = take_back(depth, taken)
+            back = penetration_correction(depth, taken)
             v[i, 0] -= gain * share * nx
             v[i, 1] -= gain * share * ny
             v[j, 0] += gain * other * nx
@@ -299,7 +324,7 @@ def _substeps(batch: Batch, busy: Array) -> None:
             i, c = hard[place, 0], hard[place, 1]
             if c < len(lines) and (push[i, 0] != 0.0 or push[i, 1] != 0.0):
                 x, y = p[i, 0] + push[i, 0], p[i, 1] + push[i, 1]
-                depth, nx, ny = meet_side(x, y, radius[i], lines, c)
+                depth, nx, ny = contact_side(x, y, radius[i], lines, c)
                 back = max(depth - SLOP, 0.0)
                 push[i, 0] += back * nx
                 push[i, 1] += back * ny
@@ -307,66 +332,66 @@ def _substeps(batch: Batch, busy: Array) -> None:
     def hold_blocks(b: int) -> None:
         for i in range(first, movers):
             speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-            share = rub(speed, law[b, GRIP])
+            share = friction_share(speed, coefficients[b, GRIP])
             v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
 
-    def settle(b: int, kick: float) -> None:
+    def settle(b: int, leapfrog_offset: float) -> None:
         for i in range(paddles, first):
-            vx, vy = v[i, 0] + kick, v[i, 1]
+            vx, vy = v[i, 0] + leapfrog_offset, v[i, 1]
             share = cap(np.sqrt(vx * vx + vy * vy), PUCK_SPEED_CAP)
             if share < 1.0:
-                v[i, 0], v[i, 1] = share * vx - kick, share * vy
+                v[i, 0], v[i, 1] = share * vx - leapfrog_offset, share * vy
             held = False
             for j in range(paddles):
                 k = i - paddles
                 held |= touching[b, j, k] or touched[b, j, k] > 0
             if held and wall(lines, radius[i], p[i, 0], p[i, 1], SQUEEZE) >= 0:
                 touch = radius[0] + radius[i]
-                x, y = slip(lines, radius[i], p[i, 0], p[i, 1], p[:paddles], touch)
+                x, y = slide_out(lines, radius[i], p[i, 0], p[i, 1], p[:paddles], touch)
                 p[i, 0], p[i, 1] = x, y
                 push[i, 0] = push[i, 1] = 0.0
 
-    def record(b: int, moment: int, kick: float) -> None:
+    def record(b: int, moment: int, leapfrog_offset: float) -> None:
         for i in range(path.shape[2]):
             for axis in range(2):
                 path[b, moment, i, axis] = p[i, axis]
                 speed = ramped[i, axis] if i < paddles else v[i, axis]
                 path[b, moment, i, 2 + axis] = speed
-            path[b, moment, i, 2] += kick if paddles <= i < first else 0.0
+            path[b, moment, i, 2] += leapfrog_offset if paddles <= i < first else 0.0
 
-    def finish(b: int, kick: float) -> None:
+    def finish(b: int, leapfrog_offset: float) -> None:
         for i in range(movers):
             for axis in range(2):
                 speed = ramped[i, axis] if i < paddles else v[i, axis]
                 position[b, i, axis], velocity[b, i, axis] = p[i, axis], speed
                 pending[b, i, axis] = push[i, axis]
         for k in range(pucks):
-            velocity[b, paddles + k, 0] += kick
+            velocity[b, paddles + k, 0] += leapfrog_offset
             if out[b, k]:
                 velocity[b, paddles + k, 0] = velocity[b, paddles + k, 1] = 0.0
 
-    for b in range(len(law)):
-        if not busy[b]:
+    for b in range(len(coefficients)):
+        if not may_collide[b]:
             continue
-        kick = 0.5 * law[b, FALL]
-        enter(b, kick)
+        leapfrog_offset = 0.5 * coefficients[b, FALL]
+        enter(b, leapfrog_offset)
         list_near(b, n)
         if path.shape[1] > 0:
-            record(b, 0, kick)
+            record(b, 0, leapfrog_offset)
         for step in range(n):
             drive(b, n - step)
             move(b)
             meet_fixed(b)
-            cross(b, kick)
+            pass_lines(b, leapfrog_offset)
             meet_each_other(b, (step + 1) * dt)
             if blocks > 0:
                 # Friction acts within a contact, which has to give back its share.
                 hold_blocks(b)
                 meet_each_other(b, (step + 1) * dt)
             yield_to_sides()
-            settle(b, kick)
+            settle(b, leapfrog_offset)
             if not fresh[0]:
                 list_near(b, n - step - 1)
             if path.shape[1] > 0:
-                record(b, step + 1, kick)
-        finish(b, kick)
+                record(b, step + 1, leapfrog_offset)
+        finish(b, leapfrog_offset)

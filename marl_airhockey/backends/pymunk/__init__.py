@@ -1,4 +1,4 @@
-"""The 2D table on Chipmunk."""
+"""Pymunk backend: the 2D table on Chipmunk, the readable reference."""
 
 from marl_airhockey.backends.pymunk.backend import make
 

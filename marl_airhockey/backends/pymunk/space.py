@@ -1,353 +1,283 @@
-"""One world on pymunk: paddles, pucks, blocks, walls and goal lines in a space.
+"""World of the pymunk backend: a space with paddles, pucks, blocks, walls and goals.
 
 Velocities inside a space are those half a substep ahead (leapfrog), so that a falling
-puck follows its parabola exactly; `kick` is what the backend adds when it reports them.
+puck follows its parabola exactly; `leapfrog_offset` is added when they are read.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pymunk
-from pymunk._chipmunk_cffi import lib
 
-from marl_airhockey.backends._planar.paddles import drive
-from marl_airhockey.backends._planar.walls import SQUEEZE, sides, slip, wall
-from marl_airhockey.backends.pymunk.chipmunk import EVENT, SUBSTEP, Reader, address
+from marl_airhockey.backends._planar.paddles import ramp_paddles
+from marl_airhockey.backends._planar.walls import SQUEEZE, sides, slide_out, wall
+from marl_airhockey.backends.pymunk.building import (
+    BLOCK,
+    EVERYTHING,
+    GOAL_LINE,
+    NOTHING,
+    PADDLE,
+    PUCK,
+    WALL,
+    Bodies,
+    Walls,
+)
 from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
-PADDLE, PUCK, WALL, GOAL_LINE, BLOCK = 1, 2, 3, 4, 5
-"""Collision types."""
-THICK = 0.5
-"""m: a wall this thick is never passed between two substeps."""
-NOTHING, EVERYTHING = pymunk.ShapeFilter(mask=0), pymunk.ShapeFilter()
-"""What a shape can touch."""
 POCKET = 100.0
 """m: pucks out of play wait here, far from everything."""
+ARM = 0.765
+"""Mean distance of a square's points from its centre, in halves of its side."""
 
 
 class Space:
-    """One world: a pymunk space with paddles, pucks, blocks, walls and goal lines.
+    """One world on pymunk.
 
     Args:
-        scene: who is on the table.
+        scene: who and what is on the table.
         control_dt: s.
         substeps: physics steps in a control step.
-        flags: (2,) this world's row of `chipmunk.new_flags`.
     """
 
-    def __init__(
-        self, scene: Scene, control_dt: float, substeps: int, flags: Array
-    ) -> None:
-        self.scene, self.control_dt, self.substeps = scene, control_dt, substeps
-        self.flags = flags
-        self.sim_dt = control_dt / substeps
+    def __init__(self, scene: Scene, control_dt: float, substeps: int) -> None:
+        self.scene, self.substeps = scene, substeps
+        self.dt = control_dt / substeps
         self.space = space = pymunk.Space()
         # Overlap goes at once; contacts rest with a tenth of a millimetre of it.
         space.collision_slop, space.collision_bias = 1e-4, 0.0
-        self._out: dict[int, tuple[float, float]] = {}
-        bodies = scene.bodies
-        pairs = (bodies.paddles, bodies.pucks)
+        bodies, lines = scene.bodies, len(scene.goal_lines)
+        pairs, table_sides = (bodies.paddles, bodies.pucks), len(scene.table.vertices)
         self.touched = np.zeros(pairs, np.int64)
         self.touched_at = np.full(pairs, np.nan)
         self.touching = np.zeros(pairs, np.bool_)
-        self.crossed = np.zeros((bodies.pucks, len(scene.goal_lines)), np.bool_)
-        self.crossed_velocity = np.zeros((*self.crossed.shape, 2))
-        self._shapes: dict[pymunk.Shape, int] = {}
-        self._sides = sides(scene)
-        self._build_bodies()
-        self._build_walls()
+        self.banked = np.zeros((bodies.pucks, table_sides), np.int64)
+        self.crossed = np.zeros((bodies.pucks, lines), np.bool_)
+        self.crossed_velocity = np.zeros((bodies.pucks, lines, 2))
+        self._bodies, self._walls = Bodies(space, scene), Walls(space, scene)
+        self._sides, self._substep = sides(scene), 0
+        self._out: dict[int, tuple[float, float]] = {}
+        """Where pucks went that are out of play, m."""
+        self._leaning: set[tuple[int, int]] = set()
+        """Pucks and sides that touch at a reset: no new bounce."""
+        self._contact = False
+        """True if a paddle touches a puck, or a puck has crossed a goal line."""
         space.on_collision(PADDLE, PUCK, begin=self._touch, separate=self._part)
         space.on_collision(PUCK, GOAL_LINE, begin=self._cross)
+        space.on_collision(PUCK, WALL, begin=self._bank)
         for kind in (PADDLE, WALL, GOAL_LINE, BLOCK):
             space.on_collision(BLOCK, kind, pre_solve=self._soften)
-        self._read = Reader(space, len(self.bodies))
-        self._space = space._space
-        self._raw = [body._body for body in self.bodies]
-        self._hands = self._raw[bodies.paddle]
-        self._mean = np.zeros((bodies.paddles, 2))
-        self._loose = [s._shape for body in self.bodies for s in body.shapes]
         self.set_physics({name: p.default for name, p in PARAMETERS.items()})
-
-    def _build_bodies(self) -> None:
-        scene, space = self.scene, self.space
-        self.bodies: list[pymunk.Body] = []
-        self.paddles: list[pymunk.Shape] = []
-        self.blocks: list[pymunk.Shape] = []
-        self._grips: list[pymunk.Constraint] = []
-        for i in range(len(scene.seats)):
-            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-            disc = pymunk.Circle(body, scene.table.paddle_radius)
-            self.paddles.append(self._add(body, disc, PADDLE, i))
-        for i in range(scene.pucks):
-            body = pymunk.Body(1.0, float("inf"))
-            disc = pymunk.Circle(body, scene.table.puck_radius)
-            self._add(body, disc, PUCK, i).elasticity = 1.0
-        for i in range(scene.blocks):
-            body = pymunk.Body(1.0, float("inf"))
-            size = 2 * scene.block_radius
-            shape: pymunk.Shape
-            if scene.block_shape == "disc":
-                shape = pymunk.Circle(body, scene.block_radius)
-            else:
-                shape = pymunk.Poly.create_box(body, (size, size))
-            self.blocks.append(self._add(body, shape, BLOCK, i))
-            # Coulomb friction on the table: joints that hold up to a largest force.
-            grip = pymunk.PivotJoint(space.static_body, body, (0, 0), (0, 0))
-            twist = pymunk.GearJoint(space.static_body, body, 0.0, 1.0)
-            for joint in (grip, twist):
-                joint.max_bias = 0.0
-                space.add(joint)
-                self._grips.append(joint)
-
-    def _add(
-        self, body: pymunk.Body, shape: pymunk.Shape, kind: int, index: int
-    ) -> pymunk.Shape:
-        shape.collision_type, shape.friction = kind, 0.0
-        self.space.add(body, shape)
-        self.bodies.append(body)
-        self._shapes[shape] = index
-        return shape
-
-    def _build_walls(self) -> None:
-        """Boxes behind every side, with a gap and a sensor in it for a goal line."""
-        scene, static = self.scene, self.space.static_body
-        self.walls: list[pymunk.Shape] = []
-        self._plugs: dict[int, pymunk.Shape] = {}
-        for side in range(len(scene.table.vertices)):
-            start, end = scene.table.ends(side)
-            along = (end - start) / np.linalg.norm(end - start)
-            out = -scene.table.normals[side] * THICK
-            goal_lines = [m for m in scene.goal_lines if m.side == side]
-            gaps = [m for m in goal_lines if m.width is not None]
-            cuts = [start - along * THICK]
-            for goal_line in gaps:
-                middle, half = (start + end) / 2, along * (goal_line.width or 0.0) / 2
-                cuts += [middle - half, middle + half]
-                # The sensor begins a radius behind the line: the centre has passed.
-                depth = out / THICK * scene.table.puck_radius
-                box = [middle - half + depth, middle + half + depth]
-                sensor = self._box(static, box[0], box[1], out)
-                sensor.sensor, sensor.collision_type = True, GOAL_LINE
-                self._shapes[sensor] = scene.goal_lines.index(goal_line)
-                self.space.add(sensor)
-                plug = self._box(static, middle - half, middle + half, out)
-                plug.collision_type, plug.filter = WALL, NOTHING
-                self._plugs[scene.goal_lines.index(goal_line)] = plug
-                self.walls.append(plug)
-                self.space.add(plug)
-            cuts.append(end + along * THICK)
-            for a, b in zip(cuts[::2], cuts[1::2], strict=True):
-                wall = self._box(static, a, b, out)
-                wall.collision_type = WALL
-                for goal_line in goal_lines:
-                    if goal_line.width is None:
-                        wall.collision_type = GOAL_LINE
-                        self._shapes[wall] = scene.goal_lines.index(goal_line)
-                self.walls.append(wall)
-                self.space.add(wall)
-        for obstacle in scene.obstacles:
-            tip = obstacle.end or obstacle.start
-            shape = pymunk.Segment(static, obstacle.start, tip, obstacle.radius)
-            shape.friction, shape.collision_type = 0.0, WALL
-            self.walls.append(shape)
-            self.space.add(shape)
-
-    @staticmethod
-    def _box(static: pymunk.Body, a: Array, b: Array, out: Array) -> pymunk.Poly:
-        corners = [(float(x), float(y)) for x, y in (a, b, b + out, a + out)]
-        box = pymunk.Poly(static, corners)
-        box.friction = 0.0
-        return box
-
-    def read(self) -> Array:
-        """(movers, 4) x, y, vx, vy of every body; the same memory at every call."""
-        return self._read()
-
-    def _touch(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        pair = self._pair(arbiter, PADDLE)
-        self.touched[pair] += 1
-        self.touched_at[pair] = (self.flags[SUBSTEP] + 1) * self.sim_dt
-        self.touching[pair] = True
-        self.flags[EVENT] = 1
-
-    def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        self.touching[self._pair(arbiter, PADDLE)] = False
-
-    def _pair(self, arbiter: pymunk.Arbiter, kind: int) -> tuple[int, int]:
-        """Indices of the shape of a kind and of the other: in any order of Chipmunk's.
-
-        When shapes are taken off, it may swap them.
-        """
-        a, b = arbiter.shapes
-        if a.collision_type != kind:
-            a, b = b, a
-        return self._shapes[a], self._shapes[b]
-
-    def _soften(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Chipmunk takes the product of two restitutions, which is right for pucks."""
-        a, b = arbiter.shapes
-        arbiter.restitution = min(a.elasticity, b.elasticity)
-
-    def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        pair = self._pair(arbiter, PUCK)
-        body = self.bodies[self.scene.bodies.puck.start + pair[0]]
-        if pair[0] in self._out:
-            return
-        self.crossed[pair] = True
-        self.crossed_velocity[pair] = body.velocity
-        self.flags[EVENT] = 1
-        if self.scene.goal_lines[pair[1]].width is not None:
-            self._out[pair[0]] = body.position
 
     def set_physics(self, values: dict[str, float]) -> None:
         """Set the parameters of this world, by name."""
         pull = GRAVITY * np.sin(np.radians(values["tilt"]))
         self.space.gravity = (-float(pull), 0.0)
         self.space.damping = float(np.exp(-values["puck_damping"]))
-        self.kick = 0.5 * self.sim_dt * float(pull)
-        for shape in self.walls:
+        self.leapfrog_offset = 0.5 * self.dt * float(pull)
+        bodies, half = self.scene.bodies, self.scene.block_radius
+        for shape in self._walls.all:
             shape.elasticity = values["wall_restitution"]
-        for paddle in self.paddles:
-            paddle.elasticity = values["paddle_restitution"]
-        for body in self.bodies[self.scene.bodies.puck]:
+        for shape in self._bodies.shapes[bodies.paddle]:
+            shape.elasticity = values["paddle_restitution"]
+        for body in self._bodies.all[bodies.puck]:
             body.mass = values["puck_mass"]
         mass, grip = values["block_mass"], values["block_friction"]
-        half = self.scene.block_radius
-        bodies = self.bodies[self.scene.bodies.block]
-        for i, (body, shape) in enumerate(zip(bodies, self.blocks, strict=True)):
-            shape.elasticity = values["block_restitution"]
+        for i, body in enumerate(self._bodies.all[bodies.block]):
+            self._bodies.shapes[bodies.block][i].elasticity = values[
+                "block_restitution"
+            ]
             body.mass = mass
-            self._grips[2 * i].max_force = mass * grip
-            # The mean distance of a square's points from its centre is 0.765 halves.
-            self._grips[2 * i + 1].max_force = mass * grip * 0.765 * half
+            self._bodies.grips[2 * i].max_force = mass * grip
+            self._bodies.grips[2 * i + 1].max_force = mass * grip * ARM * half
             if self.scene.block_shape == "square":
                 body.moment = mass * (2 * half) ** 2 / 6
 
-    def start(self, position: Array, velocity: Array, angle: Array) -> None:
-        """Put every mover (movers, 2) at a place with a velocity; forget all contacts.
+    def reset(
+        self, position: Array, velocity: Array, angle: Array, touching: Array
+    ) -> None:
+        """Place every body, (N, 2) m and m/s, (N,) rad, with contacts that last.
 
-        Shapes are added anew in their order, so that no contact of the last episode
-        lives on in Chipmunk's caches and the same start gives the same episode.
+        Shapes are added anew in their order, so that no contact of before lives on in
+        Chipmunk's caches and the same start gives the same episode.
         """
-        # Through the library, as pymunk's bookkeeping of what is added stays the same.
-        for shape in self._loose:
-            lib.cpSpaceRemoveShape(self._space, shape)
-        for shape in self._loose:
-            lib.cpSpaceAddShape(self._space, shape)
+        self.space.remove(*self._bodies.shapes)
+        self.space.add(*self._bodies.shapes)
         pucks = self.scene.bodies.puck
-        for i, body in enumerate(self.bodies):
+        for i, body in enumerate(self._bodies.all):
             x, y = position[i].tolist()
             vx, vy = velocity[i].tolist()
-            body.position = (x, y)
-            body.velocity = (vx - self.kick * (pucks.start <= i < pucks.stop), vy)
+            ahead = self.leapfrog_offset * (pucks.start <= i < pucks.stop)
+            body.position, body.velocity = (x, y), (vx - ahead, vy)
             if i >= pucks.stop:
                 body.angle, body.angular_velocity = float(angle[i]), 0.0
-            lib.cpSpaceReindexShapesForBody(self._space, body._body)
+            self.space.reindex_shapes_for_body(body)
         self._out.clear()
-        self.touching[:] = False
-        self.flags[EVENT] = 1
+        self.touching[:] = touching
+        radius = self.scene.table.puck_radius
+        self._contact = True
+        self._leaning = {
+            (k, side)
+            for k, (x, y) in enumerate(position[pucks].tolist())
+            for side in range(len(self._sides))
+            if wall(self._sides[side : side + 1], radius, x, y, 0.0) == 0
+        }
 
     def step(
         self,
-        position: Array,
-        velocity: Array,
-        goal: Array,
-        prescribed: Array,
-        lifted: Array,
+        paddles: tuple[Array, Array],
+        command: tuple[Array, Array, Array],
         path: Array | None,
     ) -> None:
-        """Move by ``control_dt``, or by what `chipmunk.drift` has left of it.
+        """Move by a control step.
 
         Args:
-            position: (paddles, 2) by now, m; changed in place.
-            velocity: (paddles, 2) by now, m/s; changed in place.
-            goal: (paddles, 2) velocity at the end of the step, m/s.
-            prescribed: (paddles,) bool: moves at ``goal`` all the time and does not yield.
-            lifted: (paddles,) bool: touches nothing.
+            paddles: (paddles, 2) positions, m, and velocities, m/s; changed in place.
+            command: (paddles, 2) velocity at the end of the step, m/s, and (paddles,)
+                bool: moves at it all along and does not yield; touches nothing.
             path: (substeps + 1, movers, 4) to be filled, or None.
         """
-        n, flags, first = self.substeps, self.flags, int(self.flags[SUBSTEP]) + 1
-        dt, size, mean = self.sim_dt, 2 * self.scene.table.paddle_radius, self._mean
-        if first:
-            self._settle()
+        (position, velocity), (goal, imposed, lifted) = paddles, command
+        mean, size = np.zeros(goal.shape), 2 * self.scene.table.paddle_radius
+        seats = self.scene.bodies.paddle
+        self._begin()
+        self._lift(lifted)
         if path is not None:
-            path[first] = self.read()
-        for k in range(first, n):
-            flags[SUBSTEP] = k
-            met = drive(
-                position, velocity, goal, prescribed, lifted, n - k, dt, size, mean
-            )
-            for body, speed in zip(self._hands, mean.tolist(), strict=True):
-                lib.cpBodySetVelocity(body, speed)
-            if met:
-                back = position - mean * dt
-                for body, place in zip(self._hands, back.tolist(), strict=True):
-                    lib.cpBodySetPosition(body, place)
-            lib.cpSpaceStep(self._space, dt)
-            if flags[EVENT]:
+            self.read(path[0])
+        for k in range(self.substeps):
+            self._substep, left = k, self.substeps - k
+            motion = position, velocity, goal, imposed, lifted, left, self.dt, size
+            met = ramp_paddles(*motion, mean)
+            for i, body in enumerate(self._bodies.all[seats]):
+                body.velocity = tuple(mean[i].tolist())
+                if met:
+                    body.position = tuple((position[i] - mean[i] * self.dt).tolist())
+            self.space.step(self.dt)
+            if self._contact:
                 self._settle()
             if path is not None:
-                path[k + 1] = self.read()
+                self.read(path[k + 1])
+        self._leaning.clear()
+        self._lift(np.zeros_like(lifted))
 
-    def begin(self) -> None:
+    def read(self, rows: Array) -> None:
+        """Fill (movers, 4) with x, y, vx, vy of every body."""
+        pucks = self.scene.bodies.puck
+        for i, body in enumerate(self._bodies.all):
+            rows[i, :2], rows[i, 2:] = body.position, body.velocity
+        rows[pucks, 2] += self.leapfrog_offset
+        for k, place in self._out.items():
+            rows[pucks.start + k] = (*place, 0.0, 0.0)
+
+    def read_angles(self, angle: Array, spin: Array) -> None:
+        """Fill (N,) rad and (N,) rad/s of the blocks."""
+        for i in range(self.scene.bodies.block.start, self.scene.bodies.block.stop):
+            body = self._bodies.all[i]
+            angle[i], spin[i] = body.angle, body.angular_velocity
+
+    def close_goals(self, closed: Array) -> None:
+        """Make goal lines (M,) bool wall, and open the others again."""
+        for index, plug in self._walls.plugs.items():
+            line = self.scene.goal_lines[index]
+            self._sides[line.side, 5] = 0.0 if closed[index] else (line.width or 0) / 2
+            plug.filter = EVERYTHING if closed[index] else NOTHING
+
+    def _begin(self) -> None:
         """Forget the events of the last step."""
-        self.touched[:] = 0
-        self.touched_at[:] = np.nan
-        self.crossed[:] = False
+        self.touched[:], self.touched_at[:] = 0, np.nan
+        self.banked[:], self.crossed[:], self.crossed_velocity[:] = 0, False, 0.0
         for k in self._out:
             self._park(k)
-        self.flags[EVENT] = bool(self._out) or bool(self.touching.any())
+        self._contact = bool(self._out) or bool(self.touching.any())
+
+    def _lift(self, lifted: Array) -> None:
+        """Take paddles (paddles,) bool off the table, and put the others back."""
+        for shape, up in zip(self._bodies.shapes, lifted.tolist(), strict=False):
+            wanted = NOTHING if up else EVERYTHING
+            if shape.filter != wanted:
+                shape.filter = wanted
+
+    def _touch(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        pair = self._pair(arbiter, PADDLE)
+        self._contact = True
+        if self.touching[pair]:
+            return
+        self.touched[pair] += 1
+        self.touched_at[pair] = (self._substep + 1) * self.dt
+        self.touching[pair] = True
+
+    def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        self.touching[self._pair(arbiter, PADDLE)] = False
+
+    def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        puck, shape = self._ordered(arbiter, PUCK)
+        k, index = self._bodies.index[puck], self._walls.goal_line[shape]
+        if k in self._out or not self._bounces(k, shape):
+            return
+        self._contact = True
+        body = self._bodies.all[self.scene.bodies.puck.start + k]
+        velocity = body.velocity.x + self.leapfrog_offset, body.velocity.y
+        self.crossed[k, index], self.crossed_velocity[k, index] = True, velocity
+        if self.scene.goal_lines[index].width is not None:
+            self._out[k] = tuple(body.position)
+
+    def _bank(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        puck, shape = self._ordered(arbiter, PUCK)
+        self._bounces(self._bodies.index[puck], shape)
+
+    def _bounces(self, k: int, shape: pymunk.Shape) -> bool:
+        """Count a bounce of puck k off a wall; False if it has touched it for long."""
+        side = self._walls.side.get(shape)
+        if side is None:
+            return True
+        if (k, side) in self._leaning:
+            return False
+        self.banked[k, side] += 1
+        return True
+
+    def _soften(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Chipmunk takes the product of two restitutions, which is right for pucks."""
+        a, b = arbiter.shapes
+        arbiter.restitution = min(a.elasticity, b.elasticity)
+
+    @staticmethod
+    def _ordered(
+        arbiter: pymunk.Arbiter, kind: int
+    ) -> tuple[pymunk.Shape, pymunk.Shape]:
+        """Return the shape of a kind and the other; Chipmunk may swap them."""
+        a, b = arbiter.shapes
+        return (a, b) if a.collision_type == kind else (b, a)
+
+    def _pair(self, arbiter: pymunk.Arbiter, kind: int) -> tuple[int, int]:
+        a, b = self._ordered(arbiter, kind)
+        return self._bodies.index[a], self._bodies.index[b]
 
     def _settle(self) -> None:
-        """After a contact: no puck in a wall, above the cap, or in a goal line in play."""
-        first = self.scene.bodies.puck.start
-        for k, body in enumerate(self._raw[self.scene.bodies.puck]):
+        """After a contact: no puck in a wall, above the cap, or in a goal in play."""
+        bodies, table, offset = (
+            self.scene.bodies,
+            self.scene.table,
+            self.leapfrog_offset,
+        )
+        radius = table.puck_radius
+        for k, puck in enumerate(self._bodies.all[bodies.puck]):
             if k in self._out:
                 self._park(k)
                 continue
-            v = lib.cpBodyGetVelocity(body)
-            vx, vy = v.x + self.kick, v.y
-            speed2 = vx * vx + vy * vy
-            if speed2 > PUCK_SPEED_CAP**2:
-                share = PUCK_SPEED_CAP / speed2**0.5
-                lib.cpBodySetVelocity(body, (vx * share - self.kick, vy * share))
-            puck = self.bodies[first + k]
-            (x, y), table = puck.position, self.scene.table
-            if wall(self._sides, table.puck_radius, x, y, SQUEEZE) < 0:
+            vx, vy = puck.velocity.x + offset, puck.velocity.y
+            square = vx * vx + vy * vy
+            if square > PUCK_SPEED_CAP**2:
+                share = PUCK_SPEED_CAP / square**0.5
+                puck.velocity = vx * share - offset, vy * share
+            x, y = puck.position
+            if wall(self._sides, radius, x, y, SQUEEZE) < 0:
                 continue
-            paddles = self.bodies[self.scene.bodies.paddle]
-            hands = np.array([paddle.position for paddle in paddles])
-            radius = table.puck_radius
-            free = slip(self._sides, radius, x, y, hands, radius + table.paddle_radius)
-            puck.position = free
+            paddles = np.array([p.position for p in self._bodies.all[bodies.paddle]])
+            touch = radius + table.paddle_radius
+            puck.position = slide_out(self._sides, radius, x, y, paddles, touch)
 
-    def _park(self, puck: int) -> None:
-        body = self._raw[self.scene.bodies.puck.start + puck]
-        lib.cpBodySetPosition(body, (POCKET * (1 + puck), POCKET))
-        lib.cpBodySetVelocity(body, (0.0, 0.0))
-
-    def lift(self, paddle: int, up: bool) -> None:
-        """Take a paddle off the table, or put it back: a lifted one touches nothing."""
-        self.paddles[paddle].filter = NOTHING if up else EVERYTHING
-
-    def closed(self, goal_lines: Array) -> None:
-        """Make goal lines (M,) bool wall, and open the others again."""
-        for goal_line, plug in self._plugs.items():
-            plug.filter = EVERYTHING if goal_lines[goal_line] else NOTHING
-            side = self.scene.goal_lines[goal_line].side
-            half = (self.scene.goal_lines[goal_line].width or 0.0) / 2
-            self._sides[side, 5] = 0.0 if goal_lines[goal_line] else half
-
-    @property
-    def addresses(self) -> tuple[int, ...]:
-        """What `chipmunk.drift` needs: the space, its reader, the paddles."""
-        hands = [address(body) for body in self._hands]
-        return address(self._space), *self._read.addresses, *hands
-
-    @property
-    def out(self) -> dict[int, tuple[float, float]]:
-        """Pucks out of play and where they went, m."""
-        return self._out
+    def _park(self, k: int) -> None:
+        body = self._bodies.all[self.scene.bodies.puck.start + k]
+        body.position, body.velocity = (POCKET * (1 + k), POCKET), (0.0, 0.0)

@@ -1,0 +1,80 @@
+"""Checks of states and memories that are set from outside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.types import Array, Memory
+
+
+def settled(state: State, scene: Scene, count: int) -> State:
+    """Return a given state as rows in which nothing is happening.
+
+    Overlapping paddles and pucks touch; there is no other event.
+
+    Args:
+        state: (W, ...), or of one world without the leading axis.
+        scene: what must be on the table.
+        count: W.
+
+    Raises:
+        ValueError: a field of a wrong shape or not finite, named.
+    """
+    rest = scene.still_state(count)
+    fields: dict[str, Any] = {}
+    for name in ("position", "velocity", "angle", "spin", "time"):
+        wanted, value = getattr(rest, name), np.asarray(getattr(state, name))
+        if value.ndim == wanted.ndim - 1 and count == 1:
+            value = value[None]
+        if value.shape != wanted.shape:
+            raise ValueError(
+                f"state.{name}: expected shape {wanted.shape}, got {value.shape}"
+            )
+        if not np.isfinite(value).all():
+            raise ValueError(f"state.{name}: every element must be finite")
+        fields[name] = value.astype(wanted.dtype)
+    obstacles = scene.bodies.movers
+    if not np.array_equal(
+        fields["position"][:, obstacles:], rest.position[:, obstacles:]
+    ):
+        raise ValueError("state.position: obstacles must be where the scene has them")
+    made = replace(rest, **fields)
+    gap = made.paddle[..., :, None, :] - made.puck[..., None, :, :]
+    touch = scene.table.paddle_radius + scene.table.puck_radius
+    near = np.hypot(gap[..., 0], gap[..., 1]) < touch
+    return replace(made, touching=near)
+
+
+def checked_memory(memory: Memory, like: Memory, count: int) -> Memory:
+    """Return a given memory with ``count`` rows.
+
+    Args:
+        memory: (W, ...), or of one world without the leading axis.
+        like: memory that the worlds have.
+        count: W.
+
+    Raises:
+        ValueError: a missing or unknown name, or a wrong shape, named.
+    """
+    for name in memory:
+        if name not in like:
+            raise ValueError(unknown_name("memory", name, like))
+    rows: Memory = {}
+    for name, kept in like.items():
+        if name not in memory:
+            raise ValueError(f"memory: {name!r} is missing")
+        value, shape = np.asarray(memory[name]), (count, *kept.shape[1:])
+        if value.shape == shape[1:] and count == 1:
+            value = value[None]
+        if value.shape != shape:
+            raise ValueError(
+                f"memory {name!r}: expected shape {shape}, got {value.shape}"
+            )
+        rows[name] = value
+    return rows
