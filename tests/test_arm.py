@@ -20,7 +20,7 @@ mujoco = pytest.importorskip("mujoco")
 pytest.importorskip("robosuite")
 
 from marl_airhockey.backends.robosuite.env import AirHockey  # noqa: E402
-from marl_airhockey.backends.robosuite.osc import forget  # noqa: E402
+from marl_airhockey.backends.robosuite.osc import subtract_payload  # noqa: E402
 
 HOME = make_seat("robot", TABLE, 0)
 FASTEST = 0.9 * np.pi
@@ -265,7 +265,7 @@ def test_the_law_does_not_know_of_a_payload():
         felt, bias = full[own, own].copy(), world.data.qfrc_bias[own].copy()
         mass[load] = felt.copy(), bias.copy()
         down, drift = world.model.opt.gravity, rate[:, own] @ speeds
-        forget(load, down, jacobian[:, own].copy(), drift, felt, bias)
+        subtract_payload(load, down, jacobian[:, own].copy(), drift, felt, bias)
         np.testing.assert_allclose(felt, mass[0.0][0], atol=1e-9)
         np.testing.assert_allclose(bias, mass[0.0][1], atol=1e-9)
     assert np.abs(mass[0.6][0] - mass[0.0][0]).max() > 0.05

@@ -55,8 +55,13 @@ class Fused:
                 self._loop = loop
             except Exception as error:
                 self._refuse(error)
+        if self._loop is not None:
+            return self._loop(sources)
         # Copies, as numpy may have handed on what it was given.
-        return tuple({k: np.array(v) for k, v in sink.items()} for sink in plain)
+        return tuple(
+            {key: np.array(array, order="C") for key, array in sink.items()}
+            for sink in plain
+        )
 
     def __call__(self, *sources: Source) -> tuple[Sink, ...]:
         """Return the sinks for all worlds of the sources, freshly allocated."""

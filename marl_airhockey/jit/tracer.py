@@ -1,4 +1,4 @@
-"""Arrays of symbols: numpy code run on them writes down the arithmetic of one world.
+"""Tracer: numpy code run on its symbols writes down the arithmetic of one world.
 
 An array of symbols is an object array, so that indexing, broadcasting and stacking are
 numpy's own; only arithmetic is recorded, element by element.
@@ -15,15 +15,15 @@ import numpy as np
 from marl_airhockey.types import Array
 
 Scalar = Any
-"""A symbol, or a number that is known when the code is traced."""
+"""Symbol, or a number that is known when the code is traced."""
 
 
 class Untraceable(Exception):
-    """Code whose course depends on the numbers, or that uses what is not known here."""
+    """Code whose control flow depends on traced values, or that has no rule here."""
 
 
 class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
-    """A number of one world: an operation on others, with its value in a sample."""
+    """Number of one world: an operation on others, with its value in a sample."""
 
     __slots__ = ("args", "op", "tape", "value")
     __hash__ = object.__hash__
@@ -36,7 +36,8 @@ class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
     ) -> Any:
         if method != "__call__" or any(np.ndim(x) for x in inputs):
             return NotImplemented
-        return _apply(ufunc.__name__, ufunc, *inputs)
+        plain = [x.item() if isinstance(x, np.ndarray) else x for x in inputs]
+        return _apply(ufunc.__name__, ufunc, *plain)
 
     def __bool__(self) -> bool:
         raise Untraceable("it asks for the truth of a number that differs by world")
@@ -48,20 +49,20 @@ class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 class Tape:
-    """All symbols of a trace, each operation once, in the order of their making."""
+    """Symbols of a trace, each operation once, in the order of their making."""
 
     def __init__(self) -> None:
         self.symbols: dict[Any, Symbol] = {}
 
     def record(self, op: str, args: tuple[Scalar, ...], value: Any) -> Symbol:
-        """The symbol of an operation."""
+        """Return the symbol of an operation."""
         key = (op, *(a if isinstance(a, Symbol) else (type(a), repr(a)) for a in args))
         if key not in self.symbols:
             self.symbols[key] = Symbol(self, op, args, value)
         return self.symbols[key]
 
     def array(self, name: tuple[int, str], sample: Array) -> Symbols:
-        """Symbols of an input of one world with the values of a sample."""
+        """Return symbols of an input of one world with the values of a sample."""
         out = np.empty(sample.shape, object)
         for index in np.ndindex(sample.shape):
             value = sample[index]
@@ -70,7 +71,7 @@ class Tape:
 
 
 def _apply(op: str, function: Callable[..., Any], *args: Scalar) -> Scalar:
-    """One operation on scalars: a number if all are known, else a symbol."""
+    """Apply an operation to scalars: a number if all are known, else a symbol."""
     values = [a.value if isinstance(a, Symbol) else a for a in args]
     with np.errstate(all="ignore"):
         value = np.asarray(function(*values))[()]
@@ -81,7 +82,7 @@ def _apply(op: str, function: Callable[..., Any], *args: Scalar) -> Scalar:
 
 
 def _each(op: str, function: Callable[..., Any], arrays: Sequence[Any]) -> Symbols:
-    """An operation on arrays, element by element, with numpy's broadcasting."""
+    """Apply an operation to arrays, element by element, with numpy's broadcasting."""
 
     def one(*args: Scalar) -> Scalar:
         return _apply(op, function, *args)
@@ -123,11 +124,11 @@ SPECIAL: dict[Any, Callable[..., Any]] = {
     np.zeros_like: _zeros_like,
     np.full_like: _full_like,
 }
-"""Functions that are no operation on single elements."""
+"""Functions of numpy that are no operation on single elements."""
 
 
 class Symbols(np.ndarray[Any, Any]):
-    """An object array of symbols (and known numbers) that records what is done."""
+    """Object array of symbols and known numbers that records operations."""
 
     def __array_ufunc__(
         self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any
@@ -136,7 +137,7 @@ class Symbols(np.ndarray[Any, Any]):
         if method == "reduce":
             done = _reduce(ufunc, inputs[0], **options)
         elif method != "__call__":
-            raise Untraceable(f"{ufunc.__name__}.{method} is not known here")
+            raise Untraceable(f"{ufunc.__name__}.{method} has no rule")
         elif ufunc in SPECIAL:
             done = SPECIAL[ufunc](*inputs)
         else:
@@ -157,7 +158,7 @@ class Symbols(np.ndarray[Any, Any]):
         return done
 
     def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
-        """Symbols of the numbers as another type."""
+        """Return symbols of the numbers as another type."""
         kind = np.dtype(dtype)
         return _each(kind.name, kind.type, (self,))
 
@@ -170,7 +171,7 @@ def _reduce(
     keepdims: bool = False,
     **_: Any,
 ) -> Symbols:
-    """A reduction as a chain of operations."""
+    """Apply a reduction as one operation after the other."""
     symbols: Array = np.asarray(array).astype(object)
     chosen = range(symbols.ndim) if axis is None else np.atleast_1d(axis)
     axes = sorted(int(a) % symbols.ndim for a in chosen)
@@ -189,7 +190,7 @@ def _reduce(
 
 
 def _counted(item: Scalar) -> Scalar:
-    """A sum takes truths as 0 and 1."""
+    """Return a truth as 0 or 1, as a sum takes it."""
     value = item.value if isinstance(item, Symbol) else item
     if isinstance(value, (bool, np.bool_)):
         return _apply("int64", np.int64, item)

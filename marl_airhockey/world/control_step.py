@@ -64,18 +64,7 @@ class ControlStep:
         to be filled, like the next two"""
         still = Command.still(backend.scene, b)
         self.prescribed, self.closed = still.prescribed, still.closed
-        trial = Step(state, still.velocity, state, memory, episode, limit)
-        made = [referee.prepare(trial) for _ in range(2)]
-        _check_memory(memory, made[0].memory)
-        self._moments = tuple(
-            Moment(
-                backend.empty_state(),
-                Limited.empty(b, seats),
-                verdict,
-                episode.counted(verdict.counters),
-            )
-            for verdict in made
-        )
+        self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
         self._now = 0
         self._pipelines: list[Pipeline] = []
         self._compile()
@@ -100,6 +89,16 @@ class ControlStep:
             raise ValueError(INFINITE)
         self._now = 1 - self._now
         return self._moments[self._now]
+
+    def _moment(self, state: State, memory: Memory, episode: Episode) -> Moment:
+        """Return a moment with arrays of its own, as a step that goes nowhere fills."""
+        here, b = self._backend.empty_state(), len(self._limit)
+        here.write(np.arange(b), state)
+        limited = Limited.empty(b, len(self._reach.share))
+        step = Step(here, limited.velocity, here, memory, episode, self._limit)
+        verdict = self._referee.prepare(step)
+        _check_memory(memory, verdict.memory)
+        return Moment(here, limited, verdict, episode.counted(verdict.counters))
 
     def _compile(self) -> None:
         first, second = self._moments

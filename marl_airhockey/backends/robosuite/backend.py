@@ -1,4 +1,4 @@
-"""A UR5e a seat on a table in MuJoCo, built with robosuite."""
+"""Robosuite backend: a UR5e a seat on a table in MuJoCo, built with robosuite."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ import logging
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from marl_airhockey.backends._planar.paddles import follow
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.state import State
 from marl_airhockey.core.table import TABLES
+from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.jit.threads import over_rows
 from marl_airhockey.types import Array
 
@@ -31,12 +32,12 @@ COARSEST = 0.004
 """s of a physics step; with longer ones arms no longer follow."""
 
 
-class Robosuite(Backend):
+class RobosuiteBackend(Backend):
     """B MuJoCo simulations of robosuite's model, stepped in compiled code.
 
     Paddles track their command as an arm can, and feel the pucks; contacts take some
-    milliseconds. A prescribed paddle is asked to go there, at its seat's top speed at most.
-    ``trace`` is what the arms did at every physics step: see `arm.lean.TRACE`.
+    milliseconds. A prescribed paddle goes there at its seat's top speed at most.
+    ``trace`` holds the motion of the arms at every physics step: see `stepper.TRACE`.
     """
 
     exact: ClassVar[bool] = True
@@ -88,7 +89,7 @@ class Robosuite(Backend):
         log.addFilter(lambda record: record.levelno >= logging.ERROR)
         from marl_airhockey.backends.robosuite.env import AirHockey
         from marl_airhockey.backends.robosuite.simulation import Arms
-        from marl_airhockey.backends.robosuite.stepper import TRACE, Table
+        from marl_airhockey.backends.robosuite.stepper import TRACE, StaticScene
 
         self._dt = control_dt / substeps
         env: Any = AirHockey(
@@ -99,7 +100,7 @@ class Robosuite(Backend):
         self.env = env
         """The robosuite environment whose model all worlds copy."""
         place, goal_lines = env.place, scene.goal_lines
-        self._table = Table(
+        self._static = StaticScene(
             origin=place.origin,
             rotation=place.rotation,
             grips=np.array([hand.grip for hand in env.hands]),
@@ -119,40 +120,49 @@ class Robosuite(Backend):
             Arms(env, copy.copy(model), self._path_shape[1:], self.trace[i], data)
             for i in range(num_worlds)
         ]
-        self._old = np.zeros((num_worlds, len(scene.seats), 2))
-        self.state = self.rest_state
+        self._last_goal = np.zeros((num_worlds, len(scene.seats), 2))
         self._cameras: dict[int, Camera] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is built from; OpenGL contexts are left behind."""
+        return {
+            "arguments": (self.scene, self.num_worlds, self.control_dt, self.substeps),
+            "worlds": [world.saved() for world in self.worlds],
+            "last_goal": self._last_goal.copy(),
+            "before": self._before,
+        }
+
+    def __setstate__(self, saved: dict[str, Any]) -> None:
+        RobosuiteBackend.__init__(self, *saved["arguments"])
+        for world, row in zip(self.worlds, saved["worlds"], strict=True):
+            world.restore(self._static, row)
+        self._last_goal[:] = saved["last_goal"]
+        self._before = saved["before"]
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         for i in worlds.tolist():
             row = {name: float(value[i]) for name, value in values.items()}
             self.worlds[i].set_physics(row)
 
-    def start(self, state: State, worlds: Array) -> None:
-        self.state = state
+    def reset(self, state: State, worlds: Array) -> None:
+        super().reset(state, worlds)
         for i in worlds.tolist():
-            new = self.worlds[i].start(
-                self._table, state.position[i], state.velocity[i], state.angle[i]
+            new = self.worlds[i].reset(
+                self._static, state.position[i], state.velocity[i], state.angle[i]
             )
             if new:
-                self._old[i] = 0.0
+                self._last_goal[i] = 0.0
 
-    def step(self, command: Command) -> State:
+    def stage(self, command: Command, before: State, after: State) -> Stage:
+        return Stage(self._move, (command, before, after))
+
+    def _move(self, command: Command, before: State, after: State) -> None:
+        """Fill ``after`` with the state a control step after ``before``."""
         from marl_airhockey.backends.robosuite.stepper import advance
 
-        velocity, prescribed, _ = self._follow(command, self.state.position)
-        top = np.array([seat.speed for seat in self.scene.seats])[:, None]
-        size = np.hypot(velocity[..., 0], velocity[..., 1])[..., None]
-        slow = np.minimum(1.0, top / np.maximum(size, 1e-9))
-        goal = np.where(prescribed[..., None], velocity * slow, velocity)
-        arrays: dict[str, Any] = {
-            name: getattr(self.state, name).copy()
-            for name in ("position", "velocity", "angle", "spin")
-        }
-        events: dict[str, list[Array]] = {}
-        path = np.empty(self._path_shape)
-        starts = [
-            world.lead(self._old[i], goal[i], self.control_dt)
+        goal = self._goal(command, before)
+        leads = [
+            world.lead(self._last_goal[i], goal[i], self.control_dt)
             for i, world in enumerate(self.worlds)
         ]
 
@@ -160,32 +170,29 @@ class Robosuite(Backend):
             for i in range(*rows.indices(self.num_worlds)):
                 world = self.worlds[i]
                 advance(
-                    world.sim,
-                    self._table,
-                    world.report,
-                    starts[i],
-                    self._old[i],
-                    goal[i],
-                    self._dt,
-                    self.substeps,
+                    *(world.sim, self._static, world.output),
+                    *(leads[i], self._last_goal[i], goal[i]),
+                    *(self._dt, self.substeps),
                 )
 
         over_rows(move, self.num_worlds, least=1)
+        after.time[:] = before.time + self.control_dt
+        after.position[:] = before.position
         for i, world in enumerate(self.worlds):
             world.retire()
-            world.read(arrays, i)
-            path[i] = world.report.path
-            for name, value in world.events.items():
-                events.setdefault(name, []).append(value.copy())
-        self._old[:] = goal
-        arrays |= {name: np.array(rows) for name, rows in events.items()}
-        self.state = replace(
-            self.rest_state,
-            **arrays,
-            time=self.state.time + self.control_dt,
-            path=path if self.scene.path else None,
-        )
-        return self.state
+            world.read(after, i)
+        self._last_goal[:] = goal
+
+    def _goal(self, command: Command, before: State) -> Array:
+        """(B, seats, 2) m/s that arms are to reach; prescribed ones at top speed."""
+        goal = np.zeros(command.velocity.shape)
+        imposed, lifted = np.zeros((2, *goal.shape[:2]), np.bool_)
+        motion = command.velocity, command.prescribed, before.position
+        follow(*motion, self.control_dt, goal, imposed, lifted)
+        top = np.array([seat.speed for seat in self.scene.seats])[:, None]
+        size = np.hypot(goal[..., 0], goal[..., 1])[..., None]
+        slow = np.minimum(1.0, top / np.maximum(size, 1e-9))
+        return np.where(imposed[..., None], goal * slow, goal)
 
     def photograph(
         self, world: int, camera: str, marks: Sequence[Mark], width: int
@@ -204,4 +211,4 @@ class Robosuite(Backend):
         self.env.close()
 
 
-make = Robosuite
+make = RobosuiteBackend

@@ -10,7 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from marl_airhockey.backends.robosuite.frames import Place
+from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.types import Array
 
@@ -27,7 +27,7 @@ class Camera:
         RuntimeError: there is no OpenGL; says what to install.
     """
 
-    def __init__(self, model: Any, place: Place, width: int, height: int) -> None:
+    def __init__(self, model: Any, place: TableFrame, width: int, height: int) -> None:
         self._place, self._model = place, model
         self._data = mujoco.MjData(model)
         # The largest picture that the model's own buffer holds.

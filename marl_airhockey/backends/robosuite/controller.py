@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from marl_airhockey.backends.robosuite.frames import Place
+from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.backends.robosuite.osc import Gains, reference, torques
 from marl_airhockey.core.limits import limits
 from marl_airhockey.core.scene import Scene
@@ -20,7 +20,7 @@ HOME = 0.35
 """m from the edge of the side to where a paddle waits."""
 
 
-class Hand:
+class SeatController:
     """The arm of a seat, in one simulation.
 
     Args:
@@ -34,7 +34,7 @@ class Hand:
     def __init__(
         self,
         scene: Scene,
-        place: Place,
+        place: TableFrame,
         seat: int,
         period: float,
         gains: Gains | None = None,
@@ -99,7 +99,7 @@ class Hand:
         """Ramp to a velocity (2,), m/s in the table frame, within the next period."""
         out = np.zeros((3, 2))
         reference(self.start, self.old, self.new, self.period, self.period, out)
-        self.start = leashed(out[0], self.position[:2])
+        self.start = limit_lead(out[0], self.position[:2])
         self.old, self.new, self._steps = self.new, np.array(velocity), 0
 
     def torques(self) -> Array:
@@ -133,7 +133,7 @@ class Hand:
         return out
 
 
-def leashed(wanted: Array, position: Array) -> Array:
+def limit_lead(wanted: Array, position: Array) -> Array:
     """A reference (..., 2) that is at most `LEASH` ahead of the paddle."""
     ahead = wanted - position
     far = np.hypot(ahead[..., 0], ahead[..., 1])[..., None]

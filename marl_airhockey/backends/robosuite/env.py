@@ -16,8 +16,8 @@ from robosuite.controllers.parts.controller_factory import controller_factory
 from robosuite.environments.manipulation.manipulation_env import ManipulationEnv
 from robosuite.models.tasks import ManipulationTask
 
-from marl_airhockey.backends.robosuite.controller import Hand
-from marl_airhockey.backends.robosuite.frames import Place
+from marl_airhockey.backends.robosuite.controller import SeatController
+from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.backends.robosuite.inverse_kinematics import reach_for
 from marl_airhockey.backends.robosuite.models import AirHockeyArena
 from marl_airhockey.backends.robosuite.table_physics import Surface
@@ -36,7 +36,7 @@ class TableController(OperationalSpaceController):
     in the seat's ego frame; it passes the shared limits.
     """
 
-    def __init__(self, *args: Any, hand: Hand, **rest: Any) -> None:
+    def __init__(self, *args: Any, hand: SeatController, **rest: Any) -> None:
         super().__init__(*args, **rest)
         self.hand = hand
         self.control_dim = 2
@@ -86,7 +86,7 @@ class AirHockeyController(CompositeController):
                 )
 
 
-def usual_cast() -> Scene:
+def default_scene() -> Scene:
     """One robot seat at home and a puck, on the standard table."""
     table = TABLES["standard"]
     return Scene(table, (make_seat("robot", table, 0),), pucks=1)
@@ -111,17 +111,19 @@ class AirHockey(ManipulationEnv):
         control_freq: float = 20,
         **rest: Any,
     ) -> None:
-        self.scene = scene if scene is not None else usual_cast()
+        self.scene = scene if scene is not None else default_scene()
         names = [robots] * len(self.scene.seats) if isinstance(robots, str) else robots
         if list(names) != [ARM] * len(self.scene.seats):
             raise ValueError(
                 f"robots: {robots!r}; a scene of {len(self.scene.seats)} seats is played "
                 f"by as many {ARM}"
             )
-        self.place = Place(self.scene.defaults.get("tilt", 0.0))
+        self.place = TableFrame(self.scene.defaults.get("tilt", 0.0))
         period = 1 / control_freq
         count = len(self.scene.seats)
-        self.hands = [Hand(self.scene, self.place, i, period) for i in range(count)]
+        self.hands = [
+            SeatController(self.scene, self.place, i, period) for i in range(count)
+        ]
         macros.SIMULATION_TIMESTEP = timestep
         configs = [
             {

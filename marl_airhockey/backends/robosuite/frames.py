@@ -25,7 +25,7 @@ BELOW = 0.02
 
 
 @dataclass(frozen=True)
-class Place:
+class TableFrame:
     """A table that is tilted by some degrees."""
 
     tilt: float = 0.0

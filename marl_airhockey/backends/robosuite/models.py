@@ -9,7 +9,7 @@ from robosuite.models.arenas import Arena
 from robosuite.models.grippers import GripperModel, register_gripper
 from robosuite.utils.mjcf_utils import array_to_string, new_body, new_geom, new_joint
 
-from marl_airhockey.backends.robosuite.frames import Place
+from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
@@ -52,7 +52,7 @@ class AirHockeyArena(Arena):
         place: where it stands.
     """
 
-    def __init__(self, scene: Scene, place: Place) -> None:
+    def __init__(self, scene: Scene, place: TableFrame) -> None:
         super().__init__(str(HERE / "arena.xml"))
         self.scene = scene
         self.table = new_body(
@@ -167,7 +167,7 @@ class AirHockeyArena(Arena):
         )
         self.table.append(body)
 
-    def _stands(self, place: Place) -> None:
+    def _stands(self, place: TableFrame) -> None:
         """Legs of the table and pedestals of the arms, to look at."""
         x, y = self.scene.table.size / 2 - 0.08
         for k, (i, j) in enumerate(((-x, -y), (-x, y), (x, -y), (x, y))):

@@ -157,7 +157,7 @@ def torques(
 
 
 @njit(cache=True)
-def forget(
+def subtract_payload(
     load: float,
     gravity: Array,
     jacobian: Array,

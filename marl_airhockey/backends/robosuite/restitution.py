@@ -15,7 +15,7 @@ LONGEST = 200
 """Steps, of any contact"""
 
 
-def returned(ratio: Array) -> Array:
+def restitution_of(ratio: Array) -> Array:
     """The share of the speed that a damped spring returns which can only push.
 
     Taken step by step, as MuJoCo's integrator does, for contacts that begin at any
@@ -40,7 +40,7 @@ def returned(ratio: Array) -> Array:
 
 
 _RATIOS = np.geomspace(1e-5, 2.0, 500)
-_SHARES = returned(_RATIOS)
+_SHARES = restitution_of(_RATIOS)
 
 
 def solref(restitution: float, timestep: float) -> Array:

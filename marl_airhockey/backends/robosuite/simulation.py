@@ -7,12 +7,21 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from marl_airhockey.backends.robosuite.controller import leashed
+from marl_airhockey.backends.robosuite.controller import limit_lead
 from marl_airhockey.backends.robosuite.inverse_kinematics import reach_for
 from marl_airhockey.backends.robosuite.osc import Gains, reference
-from marl_airhockey.backends.robosuite.stepper import Report, Simulation, Table, fresh
+from marl_airhockey.backends.robosuite.stepper import (
+    StepOutput,
+    Simulation,
+    StaticScene,
+    fresh,
+)
 from marl_airhockey.backends.robosuite.table_physics import Surface
+from marl_airhockey.core.state import EVENTS, State
 from marl_airhockey.types import Array
+
+SAVED = mujoco.mjtState.mjSTATE_INTEGRATION
+"""Part of MuJoCo's state that the next step depends on."""
 
 
 class Arms:
@@ -75,7 +84,7 @@ class Arms:
         )
         pairs, goal_lines = (self._seats, self._pucks), len(scene.goal_lines)
         crossings = self._pucks, goal_lines
-        self.report = Report(
+        self.output = StepOutput(
             np.zeros((self._seats, 4)),
             np.zeros(pairs, np.int64),
             np.zeros(pairs),
@@ -89,9 +98,11 @@ class Arms:
         self._ahead = np.zeros((self._seats, 2))
         self._whole = np.array([m.width is None for m in scene.goal_lines], np.bool_)
         self._out = np.zeros(self._pucks, np.bool_)
+        self._physics: dict[str, float] = {}
 
     def set_physics(self, values: dict[str, float]) -> None:
         """Set the physical parameters of table and arms."""
+        self._physics = dict(values)
         self.sim.gains[:] = Gains(
             plane=values["arm_stiffness"], force=values["arm_force"]
         ).array
@@ -100,8 +111,8 @@ class Arms:
         self.model.body_mass[self.model.site_bodyid[self._sites]] = self.sim.loads
         self.surface.set_physics(values)
 
-    def start(
-        self, table: Table, position: Array, velocity: Array, angle: Array
+    def reset(
+        self, table: StaticScene, position: Array, velocity: Array, angle: Array
     ) -> bool:
         """Place all bodies; whether arms were moved, which are at rest then.
 
@@ -109,7 +120,7 @@ class Arms:
         when a puck is served. Else nothing is left of what was before.
         """
         d, seats = self.data, self._seats
-        moved = bool((position[:seats] != self.report.paddles[:, :2]).any())
+        moved = bool((position[:seats] != self.output.paddles[:, :2]).any())
         if moved:
             mujoco.mj_resetData(self.model, d)
         for k, place in enumerate(self.surface.places):
@@ -123,9 +134,9 @@ class Arms:
             for puck in np.flatnonzero(self._out).tolist():
                 self.surface.put_out(puck, False)
             self._out[:] = False
-        fresh(self.sim, table, self.report)
+        fresh(self.sim, table, self.output)
         if moved:
-            self._ahead[:] = self.report.paddles[:, :2]
+            self._ahead[:] = self.output.paddles[:, :2]
         return moved
 
     def _reach(self, i: int, place: Array) -> None:
@@ -144,7 +155,7 @@ class Arms:
 
     def lead(self, old: Array, new: Array, period: float) -> Array:
         """(seats, 2) where the references of a step begin; they go on from the last."""
-        start = leashed(self._ahead, self.report.paddles[:, :2])
+        start = limit_lead(self._ahead, self.output.paddles[:, :2])
         out = np.empty((3, 2))
         for i in range(self._seats):
             reference(start[i], old[i], new[i], period, period, out)
@@ -153,7 +164,7 @@ class Arms:
 
     def retire(self) -> None:
         """Pucks that are through a goal line lie still until they are served."""
-        through = (self.report.crossed & ~self._whole).any(-1)
+        through = (self.output.crossed & ~self._whole).any(-1)
         for puck in np.flatnonzero(through).tolist():
             self._out[puck] = True
             self.surface.put_out(puck, True)
@@ -161,26 +172,41 @@ class Arms:
             dof = self.surface.dofs[puck]
             self.data.qvel[dof : dof + 3] = 0.0
 
-    @property
-    def events(self) -> dict[str, Array]:
-        """What happened in the step."""
-        r = self.report
-        return {
-            "touched": r.touched,
-            "touched_at": r.touched_at,
-            "touching": r.touching,
-            "crossed": r.crossed,
-            "crossed_velocity": r.crossed_velocity,
-        }
-
-    def read(self, arrays: dict[str, Array], row: int) -> None:
-        """Put the state into a row of the arrays of all worlds."""
-        d, seats = self.data, self._seats
-        arrays["position"][row, :seats] = self.report.paddles[:, :2]
-        arrays["velocity"][row, :seats] = self.report.paddles[:, 2:]
+    def read(self, state: State, row: int) -> None:
+        """Fill a row of a state of all worlds."""
+        d, seats, output = self.data, self._seats, self.output
+        state.position[row, :seats] = output.paddles[:, :2]
+        state.velocity[row, :seats] = output.paddles[:, 2:]
         for k, place in enumerate(self.surface.places):
             body, dof = seats + k, self.surface.dofs[k]
-            arrays["position"][row, body] = d.qpos[place : place + 2]
-            arrays["velocity"][row, body] = d.qvel[dof : dof + 2]
-            arrays["angle"][row, body] = d.qpos[place + 2]
-            arrays["spin"][row, body] = d.qvel[dof + 2]
+            state.position[row, body] = d.qpos[place : place + 2]
+            state.velocity[row, body] = d.qvel[dof : dof + 2]
+            state.angle[row, body] = d.qpos[place + 2]
+            state.spin[row, body] = d.qvel[dof + 2]
+        for name in EVENTS:
+            getattr(state, name)[row] = getattr(output, name)
+        if state.path is not None:
+            state.path[row] = output.path
+
+    def saved(self) -> dict[str, Any]:
+        """Return all that a twin needs to go on from here, in arrays."""
+        state = np.zeros(mujoco.mj_stateSize(self.model, SAVED))
+        mujoco.mj_getState(self.model, self.data, state, SAVED)
+        return {
+            "physics": dict(self._physics),
+            "state": state,
+            "output": [array.copy() for array in self.output],
+            "ahead": self._ahead.copy(),
+            "out": self._out.copy(),
+        }
+
+    def restore(self, static: StaticScene, saved: dict[str, Any]) -> None:
+        """Go on from where another simulation of the same model was saved."""
+        self.set_physics(saved["physics"])
+        for puck in np.flatnonzero(saved["out"]).tolist():
+            self.surface.put_out(puck, True)
+        mujoco.mj_setState(self.model, self.data, saved["state"], SAVED)
+        fresh(self.sim, static, self.output)
+        for array, row in zip(self.output, saved["output"], strict=True):
+            array[...] = row
+        self._ahead[:], self._out[:] = saved["ahead"], saved["out"]

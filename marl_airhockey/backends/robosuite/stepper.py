@@ -14,7 +14,7 @@ from marl_airhockey.backends.robosuite.mujoco_c import (
     step1,
     step2,
 )
-from marl_airhockey.backends.robosuite.osc import forget, reference, torques
+from marl_airhockey.backends.robosuite.osc import subtract_payload, reference, torques
 from marl_airhockey.backends.robosuite.table_physics import slide
 from marl_airhockey.types import Array
 
@@ -56,7 +56,7 @@ class Simulation(NamedTuple):
     """(seats,) kg at the feet, of which the law does not know"""
 
 
-class Table(NamedTuple):
+class StaticScene(NamedTuple):
     """What all worlds share."""
 
     origin: Array
@@ -79,7 +79,7 @@ class Table(NamedTuple):
     """(goal lines,) a whole side, which a puck crosses by touching it"""
 
 
-class Report(NamedTuple):
+class StepOutput(NamedTuple):
     """What a world tells of a step; filled in place."""
 
     paddles: Array
@@ -101,8 +101,8 @@ class Report(NamedTuple):
 @njit(cache=True, nogil=True)
 def advance(
     sim: Any,
-    table: Any,
-    report: Any,
+    static: Any,
+    output: Any,
     start: Array,
     old: Array,
     new: Array,
@@ -124,10 +124,10 @@ def advance(
     seats, nv = len(sim.arms), len(sim.qvel)
     jacobian, rate, mass = np.empty((6, nv)), np.empty((6, nv)), np.empty((nv, nv))
     wanted, out, drift = np.empty((3, 2)), np.empty(6), np.empty(6)
-    report.touched[:], report.touched_at[:], report.crossed[:] = 0, np.nan, False
-    report.crossed_velocity[:] = 0.0
-    if len(report.path):
-        _record(sim, report, 0)
+    output.touched[:], output.touched_at[:], output.crossed[:] = 0, np.nan, False
+    output.crossed_velocity[:] = 0.0
+    if len(output.path):
+        _record(sim, output, 0)
     for k in range(substeps):
         full_mass(sim.model, mass.ctypes.data, sim.inertia)
         for s in range(seats):
@@ -156,64 +156,64 @@ def advance(
             own = jacobian[:, joint : joint + 6].copy()
             inertia = mass[joint : joint + 6, joint : joint + 6].copy()
             bias = sim.bias[joint : joint + 6].copy()
-            forget(sim.loads[s], sim.gravity, own, drift, inertia, bias)
+            subtract_payload(sim.loads[s], sim.gravity, own, drift, inertia, bias)
             share = torques(
                 own,
                 drift,
                 inertia,
                 bias,
                 speeds,
-                _local(table, sim.places[site]),
+                _local(static, sim.places[site]),
                 sim.turns[site].reshape(3, 3),
-                table.rotation,
-                table.grips[s],
+                static.rotation,
+                static.grips[s],
                 wanted,
                 sim.gains[s],
-                table.low[s],
-                table.high[s],
+                static.low[s],
+                static.high[s],
                 out,
             )
             for j in range(6):
                 sim.ctrl[motor + j] = out[j]
-            report.trace[k, s, 4] = share
-        slide(sim.surface, sim.movers[:, 1], table.pucks, sim.qvel, sim.applied, dt)
+            output.trace[k, s, 4] = share
+        slide(sim.surface, sim.movers[:, 1], static.pucks, sim.qvel, sim.applied, dt)
         step2(sim.model, sim.data)
         for s in range(seats):
-            report.trace[k, s, 2] = sim.sensors[sim.arms[s, 5]]
+            output.trace[k, s, 2] = sim.sensors[sim.arms[s, 5]]
         step1(sim.model, sim.data)
-        _see(sim, table, report, k, jacobian)
-        _events(sim, table, report, dt * (k + 1))
-        if len(report.path):
-            _record(sim, report, k + 1)
+        _see(sim, static, output, k, jacobian)
+        _events(sim, static, output, dt * (k + 1))
+        if len(output.path):
+            _record(sim, output, k + 1)
 
 
 @njit(cache=True)
-def fresh(sim: Any, table: Any, report: Any) -> None:
+def fresh(sim: Any, static: Any, output: Any) -> None:
     """Bring a world's derived arrays, paddles and contacts up to its positions."""
     step1(sim.model, sim.data)
-    _see(sim, table, report, 0, np.empty((6, len(sim.qvel))))
-    _events(sim, table, report, 0.0)
+    _see(sim, static, output, 0, np.empty((6, len(sim.qvel))))
+    _events(sim, static, output, 0.0)
 
 
 @njit(cache=True)
-def _local(table: Any, place: Array) -> Array:
+def _local(static: Any, place: Array) -> Array:
     """(3,) in the table frame."""
     found = np.zeros(3)
     for i in range(3):
         for j in range(3):
-            found[i] += table.rotation[j, i] * (place[j] - table.origin[j])
+            found[i] += static.rotation[j, i] * (place[j] - static.origin[j])
     return found
 
 
 @njit(cache=True)
-def _see(sim: Any, table: Any, report: Any, k: int, jacobian: Array) -> None:
+def _see(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> None:
     """Where the paddles are, how fast, and the row of the trace."""
     for s in range(len(sim.arms)):
         _, joint, _, site, _, _ = sim.arms[s]
         site_jacobian(
             sim.model, sim.data, jacobian.ctypes.data, jacobian[3:].ctypes.data, site
         )
-        position, fastest = _local(table, sim.places[site]), 0.0
+        position, fastest = _local(static, sim.places[site]), 0.0
         world = np.zeros(3)
         for j in range(6):
             speed = sim.qvel[joint + j]
@@ -221,57 +221,57 @@ def _see(sim: Any, table: Any, report: Any, k: int, jacobian: Array) -> None:
             for i in range(3):
                 world[i] += jacobian[i, joint + j] * speed
         for i in range(2):
-            report.paddles[s, i], report.paddles[s, 2 + i] = position[i], 0.0
+            output.paddles[s, i], output.paddles[s, 2 + i] = position[i], 0.0
             for j in range(3):
-                report.paddles[s, 2 + i] += table.rotation[j, i] * world[j]
+                output.paddles[s, 2 + i] += static.rotation[j, i] * world[j]
         upright = 0.0
         for j in range(3):
-            upright += table.grips[s, j, 2] * sim.turns[site, 3 * j + 2]
-        row = report.trace[k, s]
+            upright += static.grips[s, j, 2] * sim.turns[site, 3 * j + 2]
+        row = output.trace[k, s]
         row[0], row[3] = position[2], fastest
         row[1] = np.arccos(min(upright, 1.0))
-        row[5] = np.hypot(report.paddles[s, 2], report.paddles[s, 3])
+        row[5] = np.hypot(output.paddles[s, 2], output.paddles[s, 3])
 
 
 @njit(cache=True)
-def _events(sim: Any, table: Any, report: Any, elapsed: float) -> None:
+def _events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
     """Contacts that begin and goal lines that are crossed."""
-    near = table.radius[0] + table.radius[1]
-    for p in range(table.pucks):
+    near = static.radius[0] + static.radius[1]
+    for p in range(static.pucks):
         x, y = sim.qpos[sim.movers[p, 0]], sim.qpos[sim.movers[p, 0] + 1]
         vx, vy = sim.qvel[sim.movers[p, 1]], sim.qvel[sim.movers[p, 1] + 1]
         for s in range(len(sim.arms)):
-            dx, dy = x - report.paddles[s, 0], y - report.paddles[s, 1]
+            dx, dy = x - output.paddles[s, 0], y - output.paddles[s, 1]
             meets = dx * dx + dy * dy < near * near
-            if meets and not report.touching[s, p]:
-                report.touched[s, p] += 1
-                report.touched_at[s, p] = elapsed
-            report.touching[s, p] = meets
-        for m in range(len(table.offsets)):
-            nx, ny = table.normals[m, 0], table.normals[m, 1]
-            inside = nx * x + ny * y + table.offsets[m]
-            if table.whole[m]:
-                past = inside < table.radius[1]
+            if meets and not output.touching[s, p]:
+                output.touched[s, p] += 1
+                output.touched_at[s, p] = elapsed
+            output.touching[s, p] = meets
+        for m in range(len(static.offsets)):
+            nx, ny = static.normals[m, 0], static.normals[m, 1]
+            inside = nx * x + ny * y + static.offsets[m]
+            if static.whole[m]:
+                past = inside < static.radius[1]
             else:
-                a, b = table.ways[m, 0], table.ways[m, 1]
+                a, b = static.ways[m, 0], static.ways[m, 1]
                 along = (x - a[0]) * (b[0] - a[0]) + (y - a[1]) * (b[1] - a[1])
                 length = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2
                 past = inside < 0.0 and 0.0 < along < length
-            if past and not report.beyond[p, m]:
-                report.crossed[p, m] = True
-                report.crossed_velocity[p, m, 0] = vx
-                report.crossed_velocity[p, m, 1] = vy
-            report.beyond[p, m] = past
+            if past and not output.beyond[p, m]:
+                output.crossed[p, m] = True
+                output.crossed_velocity[p, m, 0] = vx
+                output.crossed_velocity[p, m, 1] = vy
+            output.beyond[p, m] = past
 
 
 @njit(cache=True)
-def _record(sim: Any, report: Any, k: int) -> None:
+def _record(sim: Any, output: Any, k: int) -> None:
     """A row of the path."""
     seats = len(sim.arms)
     for s in range(seats):
-        report.path[k, s] = report.paddles[s]
+        output.path[k, s] = output.paddles[s]
     for i in range(len(sim.movers)):
         place, speed = sim.movers[i]
         for j in range(2):
-            report.path[k, seats + i, j] = sim.qpos[place + j]
-            report.path[k, seats + i, 2 + j] = sim.qvel[speed + j]
+            output.path[k, seats + i, j] = sim.qpos[place + j]
+            output.path[k, seats + i, 2 + j] = sim.qvel[speed + j]

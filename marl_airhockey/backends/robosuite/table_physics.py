@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numba import njit
 
-from marl_airhockey.backends.robosuite.frames import Place
+from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.backends.robosuite.models import RAIL, SLIDES
 from marl_airhockey.backends.robosuite.restitution import solref
 from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
@@ -27,7 +27,7 @@ class Surface:
         data: its data.
     """
 
-    def __init__(self, scene: Scene, place: Place, model: Any, data: Any) -> None:
+    def __init__(self, scene: Scene, place: TableFrame, model: Any, data: Any) -> None:
         self.scene, self.place, self._model, self._data = scene, place, model, data
         names = [f"puck{k}" for k in range(scene.pucks)]
         names += [f"block{k}" for k in range(scene.blocks)]
