@@ -25,11 +25,11 @@ from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.rllib import algorithm, start_ray
+from marl_airhockey.learn.rllib import build_algorithm, start_ray
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU
-from marl_airhockey.learn.sb3 import build
-from marl_airhockey.learn.sb3_callback import Rate
-from marl_airhockey.learn.self_play import environment
+from marl_airhockey.learn.sb3 import build_model
+from marl_airhockey.learn.sb3_callback import AdaptiveRate
+from marl_airhockey.learn.self_play import make_training_env
 
 
 class Turn(NamedTuple):
@@ -51,8 +51,8 @@ def timed(work: Callable[[], tuple[int, float]]) -> Turn:
 def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Turn]:
     """Turns of the engine "sb3"."""
     config = preset(scenario, {"num_worlds": worlds})
-    env = environment(config, worlds, folder)
-    model = build(config, env, Rate(config, config.learning_rate))
+    env = make_training_env(config, worlds, folder)
+    model = build_model(config, env, AdaptiveRate(config, config.learning_rate))
     model.set_logger(Logger(None, []))
     steps = config.n_steps * config.slots
 
@@ -66,7 +66,7 @@ def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Turn]:
 def rllib(scenario: str, worlds: int, folder: Path, runners: int) -> Callable[[], Turn]:
     """Turns of the engine "rllib"."""
     changes = {"engine": "rllib", "num_env_runners": runners, "num_worlds": worlds}
-    algo = algorithm(preset(scenario, changes), folder)
+    algo = build_algorithm(preset(scenario, changes), folder)
 
     def work() -> tuple[int, float]:
         found = algo.train()["env_runners"]

@@ -13,7 +13,8 @@ import numpy as np
 import typer
 
 import marl_airhockey as ah
-from marl_airhockey.render.renderer import Renderer, draw
+from marl_airhockey.render.picture import draw
+from marl_airhockey.render.renderer import Renderer
 from marl_airhockey.types import Array
 
 COLUMNS = 2

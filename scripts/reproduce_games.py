@@ -23,9 +23,9 @@ from rich.console import Console
 from rich.table import Table
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, curve, save, tidy
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, plot_iqm, save, tidy
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import bootstrap, interval
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
@@ -67,7 +67,7 @@ def versus(game: str, folders: Sequence[Path]) -> Table:
         rivals: list[Driver] = [make_driver(name) for name in (*SEEN, *UNSEEN)]
         rivals.append(load_policy(milestone(folder, 0.1)))
         policy = load_policy(folder / "last.zip")
-        score, _ = challenge(game, policy, rivals, GAMES, SEED, BATCHED)
+        score, _ = play_against(game, policy, rivals, GAMES, SEED, BATCHED)
         columns.append(score)
     for i, name in enumerate(names):
         cells = []
@@ -109,7 +109,7 @@ def together(game: str, folders: Sequence[Path]) -> Table:
 
 
 def curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Scores against rivals over the CPU time of training; see `charts.curve`."""
+    """Scores against rivals over the CPU time of training; see `charts.plot_iqm`."""
     runs = []
     for folder in folders:
         with (folder / "evaluations.csv").open() as file:
@@ -120,7 +120,7 @@ def curves(game: str, folders: Sequence[Path], path: Path) -> None:
     cpu = np.mean([[float(r["cpu_seconds"]) for r in x[:length]] for x in runs], 0) / 60
     for name, ink in zip(names, (*INKS, INK), strict=False):
         share = np.array([[float(r[name]) for r in x[:length]] for x in runs])
-        curve(axes, cpu, share, ink, name.partition("/")[2])
+        plot_iqm(axes, cpu, share, ink, name.partition("/")[2])
     axes.set(
         xlabel="CPU-minutes of training",
         ylabel="score: win + draw / 2",

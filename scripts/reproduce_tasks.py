@@ -28,7 +28,7 @@ from marl_airhockey import make_agent
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.plots import seed_curves
+from marl_airhockey.learn.plots import plot_seed_curves
 from marl_airhockey.learn.train import train
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
@@ -145,7 +145,7 @@ def main(
         for name in names
     }
     picture = out / f"curves_{profile}.png"
-    seed_curves(curves, picture)
+    plot_seed_curves(curves, picture)
     console.print("learning curves:", picture)
     if markdown is not None:
         ruled = [heads, ("---",) * len(heads), *lines]

@@ -27,7 +27,7 @@ from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune.registry import register_env
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.rllib import start_ray
 from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.policies import Policy
@@ -95,7 +95,7 @@ def main(
     algorithm.save_to_path(str(checkpoint))
     algorithm.stop()
     rivals = [make_driver("random")]
-    score, _ = challenge(
+    score, _ = play_against(
         "duel", reload(checkpoint, "p0"), rivals, games, 0, {"backend": "numba"}
     )
     print(f"{checkpoint}: p0 as a driver scores {score[0]:.3f} against random")

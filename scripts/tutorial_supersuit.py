@@ -21,7 +21,7 @@ import typer
 from stable_baselines3 import PPO
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.policies import Policy
 
@@ -64,7 +64,7 @@ def main(
         return np.asarray(model.predict(observation, deterministic=mean)[0])
 
     rivals = [make_driver("random")]
-    score, margin = challenge(
+    score, margin = play_against(
         "duel", Policy(predict), rivals, games, 0, {"backend": "numba"}
     )
     print(f"{model.num_timesteps:,} agent-steps at {rate:,.0f} per second")

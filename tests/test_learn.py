@@ -18,9 +18,12 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.config import TrainConfig, load_config, preset
+from marl_airhockey.learn.best_response import best_response
+from marl_airhockey.learn.config import RUN_FORMAT, TrainConfig, load_config, preset
+from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.train import train
 from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.transfer.measure import fine_tuning_config
 
 SMALL = {
     "total_steps": 16_384,
@@ -60,6 +63,32 @@ def test_a_configuration_survives_its_file(tmp_path):
     path.write_text("nothing = 1")
     with pytest.raises(ValueError, match="no training configuration"):
         load_config(path)
+
+
+def test_a_run_of_another_format_is_refused(tmp_path):
+    folder = tmp_path / "old"
+    folder.mkdir()
+    for name in ("last.zip", "state.json"):
+        (folder / name).touch()
+    old = preset("duel", SMALL).to_toml()
+    assert old.startswith(f"format = {RUN_FORMAT}\n")
+    # Runs begun before there was a number have none; newer ones have a higher one.
+    for text, found in (
+        (old.partition("\n")[2], "format 1"),
+        (old.replace(f"format = {RUN_FORMAT}", "format = 99"), "format 99"),
+    ):
+        (folder / "config.toml").write_text(text)
+        fresh = preset("duel", {**SMALL, "init": str(folder)})
+        for use in (
+            lambda: train(None, folder),
+            lambda: train(fresh, tmp_path / f"new {found}"),
+            lambda: export_policy(folder, tmp_path / "policy.npz"),
+            lambda: fine_tuning_config(folder, 64),
+            lambda: best_response("duel", "still", 64, folder),
+        ):
+            with pytest.raises(ValueError, match=f"another version .*{found}"):
+                use()
+    assert not (tmp_path / "policy.npz").exists()
 
 
 @pytest.fixture(scope="module")
