@@ -32,7 +32,7 @@ def run_demo(
         scenario: name of the task to learn.
         out: folder; an earlier demonstration in it is replaced.
         steps: steps of single worlds; None for the preset's.
-        report: called as training goes on, see `train`.
+        report: called during training, see `train`.
 
     Returns:
         Results of the learned policy and of `BESIDE`, and the files by name.

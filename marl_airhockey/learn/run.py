@@ -46,7 +46,7 @@ class TrainingRun:
     Args:
         config: configuration of the run.
         folder: folder of the run; what is there already is continued.
-        report: called as training goes on.
+        report: called during training.
     """
 
     def __init__(

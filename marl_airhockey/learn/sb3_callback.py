@@ -46,7 +46,7 @@ class AdaptiveRate:
 
 
 class TrainingCallback(BaseCallback):
-    """Callback that logs, evaluates and saves the policy as training goes on.
+    """Callback that logs, evaluates and saves the policy during training.
 
     Args:
         run: run whose folder is kept up to date.

@@ -28,7 +28,7 @@ def train(
     Args:
         config: configuration of a new run; None to resume the run in the folder.
         folder: folder of the run; must be new unless it is resumed.
-        report: called as training goes on.
+        report: called during training.
 
     Returns:
         The last row of ``evaluations.csv``.

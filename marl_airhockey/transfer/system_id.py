@@ -120,7 +120,7 @@ def _fit_parameters(
 
 
 class _SegmentModel:
-    """All segments simulated at once, one world of the 2D table for each.
+    """Simulation of all segments at once, one world of the 2D table for each.
 
     Args:
         play: recorded play.
