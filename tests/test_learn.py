@@ -65,29 +65,27 @@ def test_a_configuration_survives_its_file(tmp_path):
         load_config(path)
 
 
-def test_a_run_of_another_format_is_refused(tmp_path):
+@pytest.mark.parametrize("found", [1, 99])
+def test_a_run_of_another_format_is_refused(tmp_path, found):
     folder = tmp_path / "old"
     folder.mkdir()
     for name in ("last.zip", "state.json"):
         (folder / name).touch()
-    old = preset("duel", SMALL).to_toml()
-    assert old.startswith(f"format = {RUN_FORMAT}\n")
-    # Runs begun before there was a number have none; newer ones have a higher one.
-    for text, found in (
-        (old.partition("\n")[2], "format 1"),
-        (old.replace(f"format = {RUN_FORMAT}", "format = 99"), "format 99"),
+    first, _, settings = preset("duel", SMALL).to_toml().partition("\n")
+    assert first == f"format = {RUN_FORMAT}"
+    # The first runs had no number.
+    number = "" if found == 1 else f"format = {found}\n"
+    (folder / "config.toml").write_text(number + settings)
+    fresh = preset("duel", {**SMALL, "init": str(folder)})
+    for use in (
+        lambda: train(None, folder),
+        lambda: train(fresh, tmp_path / "fresh"),
+        lambda: export_policy(folder, tmp_path / "policy.npz"),
+        lambda: fine_tuning_config(folder, 64),
+        lambda: best_response("duel", "still", 64, folder),
     ):
-        (folder / "config.toml").write_text(text)
-        fresh = preset("duel", {**SMALL, "init": str(folder)})
-        for use in (
-            lambda: train(None, folder),
-            lambda: train(fresh, tmp_path / f"new {found}"),
-            lambda: export_policy(folder, tmp_path / "policy.npz"),
-            lambda: fine_tuning_config(folder, 64),
-            lambda: best_response("duel", "still", 64, folder),
-        ):
-            with pytest.raises(ValueError, match=f"another version .*{found}"):
-                use()
+        with pytest.raises(ValueError, match=f"another version .*format {found}"):
+            use()
     assert not (tmp_path / "policy.npz").exists()
 
 
