@@ -31,12 +31,11 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from pymunk._chipmunk_cffi import lib
 from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.backends.pymunk.backend import Pymunk
+from marl_airhockey.backends.pymunk.backend import PymunkBackend
 
 Play = Callable[[], int]
 """Steps for a moment and says how many env-steps that were."""
@@ -100,14 +99,12 @@ def bare(scenario: str) -> Made:
     env = ah.parallel_env(scenario)
     env.reset(seed=0)
     backend = env.world.backend
-    assert isinstance(backend, Pymunk)
+    assert isinstance(backend, PymunkBackend)
     space, state = backend.spaces[0], env.world.state
     position, velocity = state.position[0], state.velocity[0]
-    movers = len(space.bodies)
-    raw, chipmunk = space.bodies[0]._body, space.space._space
+    paddle, chipmunk = space.bodies.all[0], space.space
     drawn = np.random.default_rng(0).uniform(-0.7, 0.7, (CHUNK, 2)).tolist()
-    set_velocity, advance = lib.cpBodySetVelocity, lib.cpSpaceStep
-    substeps, dt = space.substeps, space.sim_dt
+    substeps, dt, touching = space.substeps, space.dt, state.touching[0]
     count = 0
 
     def play() -> int:
@@ -115,10 +112,10 @@ def bare(scenario: str) -> Made:
         for vx, vy in drawn:
             count += 1
             if count % 40 == 0:
-                space.start(position[:movers], velocity[:movers], state.angle[0])
-            set_velocity(raw, (vx if count & 1 else -vx, vy if count & 1 else -vy))
+                space.reset(position, velocity, state.angle[0], touching)
+            paddle.velocity = (vx, vy) if count & 1 else (-vx, -vy)
             for _ in range(substeps):
-                advance(chipmunk, dt)
+                chipmunk.step(dt)
         return CHUNK
 
     return play, 1
@@ -196,13 +193,13 @@ def jaxmarl(scenario: str, number: int, length: int) -> Made:
     def advance(last: Any, row: Any) -> Any:
         return step(row[0], last[1], row[1])[:4], None
 
-    replay_memory = jax.jit(partial(jax.lax.replay_memory, advance))
+    scan = jax.jit(partial(jax.lax.scan, advance))
     _, state = jax.vmap(env.reset)(jax.random.split(start, number))
     last = step(keys[0], state, {a: rows[0] for a, rows in actions.items()})[:4]
 
     def play() -> int:
         nonlocal last
-        last = jax.block_until_ready(replay_memory(last, (keys, actions)))[0]
+        last = jax.block_until_ready(scan(last, (keys, actions)))[0]
         return length * number
 
     return play, env.num_agents

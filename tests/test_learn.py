@@ -18,9 +18,12 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.learn.best_response import best_response
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
+from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.train import train
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.toolkit.policies import RUN_FORMAT, load_policy
+from marl_airhockey.transfer.measure import fine_tuning_config
 
 SMALL = {
     "total_steps": 16_384,
@@ -60,6 +63,30 @@ def test_a_configuration_survives_its_file(tmp_path):
     path.write_text("nothing = 1")
     with pytest.raises(ValueError, match="no training configuration"):
         load_config(path)
+
+
+@pytest.mark.parametrize("found", [1, 99])
+def test_a_run_of_another_format_is_refused(tmp_path, found):
+    folder = tmp_path / "old"
+    folder.mkdir()
+    for name in ("last.zip", "state.json"):
+        (folder / name).touch()
+    first, _, settings = preset("duel", SMALL).to_toml().partition("\n")
+    assert first == f"format = {RUN_FORMAT}"
+    # The first runs had no number.
+    number = "" if found == 1 else f"format = {found}\n"
+    (folder / "config.toml").write_text(number + settings)
+    fresh = preset("duel", {**SMALL, "init": str(folder)})
+    for use in (
+        lambda: train(None, folder),
+        lambda: train(fresh, tmp_path / "fresh"),
+        lambda: export_policy(folder, tmp_path / "policy.npz"),
+        lambda: fine_tuning_config(folder, 64),
+        lambda: best_response("duel", "still", 64, folder),
+    ):
+        with pytest.raises(ValueError, match=f"another version .*format {found}"):
+            use()
+    assert not (tmp_path / "policy.npz").exists()
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +184,16 @@ def test_any_sb3_zip_whose_spaces_fit_drives(tmp_path):
         kind("MlpPolicy", env, policy_kwargs={"net_arch": [8]}, **extra).save(path)
         result = evaluate(load_policy(path), kind.__name__, "reach", 5)
         assert result.episodes == 5
+
+
+def test_a_policy_of_a_run_of_another_format_is_refused(run, tmp_path):
+    model = PPO.load(run / "last.zip", device="cpu")
+    assert model.card["run_format"] == RUN_FORMAT
+    del model.card["run_format"]
+    model.save(tmp_path / "last.zip")
+    for path in (tmp_path, tmp_path / "last.zip"):
+        with pytest.raises(ValueError, match=r"last\.zip: .*another version"):
+            load_policy(path)
 
 
 def onnx_policy(path, size, outputs):

@@ -58,7 +58,12 @@ def transfer(
     as_json: AsJson = False,
 ) -> None:
     """How do policies from the 2D table do elsewhere? Success with 95 % intervals."""
-    from marl_airhockey.transfer.measure import measure, picture, schooled, tuned
+    from marl_airhockey.transfer.measure import (
+        fine_tuning_config,
+        measure_transfer,
+        plot_transfer,
+        pretraining_config,
+    )
 
     folder = out or Path("runs") / f"transfer-{scenario}"
     # All that may be wrong is looked at before anything takes time.
@@ -74,14 +79,14 @@ def transfer(
     names = list(policy or [])
     if not names:
         for kind in PROFILES:
-            names.append(_run(folder / kind, schooled(scenario, kind, seed)))
+            names.append(_run(folder / kind, pretraining_config(scenario, kind, seed)))
     if fine_tune:
         runs = [n for n in names if (Path(n) / "config.toml").exists()]
         if not runs:
             raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
         for name in runs:
             run = folder / f"{Path(name).name}-tuned-{fine_tune}"
-            names.append(_run(run, tuned(Path(name), fine_tune)))
+            names.append(_run(run, fine_tuning_config(Path(name), fine_tune)))
     policies: dict[str, Driver] = {}
     for name in names:
         short = Path(name).name if Path(name).exists() else name
@@ -89,7 +94,7 @@ def transfer(
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)
         task = progress.add_task("measuring", total=total, note="")
-        rows = measure(
+        rows = measure_transfer(
             policies,
             scenario,
             backends,
@@ -102,7 +107,7 @@ def transfer(
     data = json.dumps([row.to_json() for row in rows], indent=1)
     (folder / "transfer.json").write_text(data)
     require("matplotlib", "train")
-    picture(rows, folder / "transfer.png")
+    plot_transfer(rows, folder / "transfer.png")
     if as_json:
         console.print_json(data)
         return
@@ -151,22 +156,22 @@ def fit(
     out: Annotated[Path, typer.Option(help="The preset.")] = Path("fit.toml"),
 ) -> None:
     """Fit the 2D table's physics to play on another one, for --physics FILE."""
-    from marl_airhockey.transfer.system_id import fit as find
-    from marl_airhockey.transfer.system_id import play, recorded
+    from marl_airhockey.transfer.recorded_play import load_recordings, record_play
+    from marl_airhockey.transfer.system_id import fit_physics
 
     if recordings is not None:
-        seen = recorded(sorted(recordings.glob("*.jsonl")))
+        seen = load_recordings(sorted(recordings.glob("*.jsonl")))
     else:
         who = make_agent(driver or f"zoo/{scenario}")
         there = load_physics(physics) if physics else {}
         with console.status(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}
-            seen = play(scenario, who, steps, seed, keywords)
+            seen = record_play(scenario, who, steps, seed, keywords)
     with console.status("fitting"):
-        found = find(seen)
+        found = fit_physics(seen)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(found.to_toml())
-    table = Table("", "usual values", "fitted", title=f"{found.stretches} stretches")
+    table = Table("", "usual values", "fitted", title=f"{found.segments} segments")
     for name, value in found.physics.items():
         usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
         table.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
@@ -174,4 +179,6 @@ def fit(
         shown = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
         table.add_row(name, *shown)
     console.print(table)
-    console.print(f"{found.closed:.0%} of the pucks' error is gone; wrote {out}")
+    console.print(
+        f"{found.error_reduction:.0%} of the pucks' error is gone; wrote {out}"
+    )

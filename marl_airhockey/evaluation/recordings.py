@@ -1,4 +1,4 @@
-"""Recordings: see the definitions."""
+"""Recordings of play: JSON lines with a meta line, a line per step, and an end."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 FORMAT = 1
-
-
+"""Number of the format, in the meta line"""
 STEP = {"n", "time", "pads", "pucks", "events", "excess", "delays", "caption"}
-"""What readers need of every step."""
+"""Keys that every step must have"""
 
 
 def head(path: Path) -> dict[str, Any]:
-    """The first line of a file of JSON lines; {} if it is none."""
+    """Return the first line of a file of JSON lines; {} if it is no such file."""
     try:
         with path.open() as file:
             row = json.loads(file.readline())
@@ -24,9 +23,10 @@ def head(path: Path) -> dict[str, Any]:
 
 
 def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
-    """The meta line, the steps and the end ({} if it was cut off) of a recording.
+    """Return the meta line, the steps and the end of a recording.
 
-    A last line that is not whole, and what follows one, is left out.
+    The end is {} if the recording was cut off. An incomplete line, and all lines after
+    it, are left out.
 
     Raises:
         ValueError: no recording, or one of another format.

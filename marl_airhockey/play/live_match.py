@@ -23,7 +23,7 @@ from marl_airhockey.registry import (
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world
-from marl_airhockey.world.driven_seat import Driven
+from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.episode import StepResult
 
 RATE = 60
@@ -135,13 +135,13 @@ class Court:
                 found.append((other, name))
         return [name for _, name in sorted(found)]
 
-    def _sit(self, i: int) -> Driven:
+    def _sit(self, i: int) -> DrivenSeat:
         """The driver of a seat as the world calls it."""
         name, world = self.who[i], self.world
         driver = self._hands[i]
         if name != PERSON:
             driver = self.fairness.hold(make_agent(name))
-        return Driven(i, driver, world.observer, 1, world.control_dt)
+        return DrivenSeat(i, driver, world.observer, 1, world.control_dt)
 
     def seat(self, i: int, name: str) -> None:
         """Give a seat to somebody else; between matches.

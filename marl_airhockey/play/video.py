@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.core.state import State, still_state
+from marl_airhockey.core.state import State
 from marl_airhockey.evaluation.recordings import read
 from marl_airhockey.registry import make_scenario
-from marl_airhockey.render.renderer import Frame, Renderer, draw
+from marl_airhockey.render.picture import Frame, draw
+from marl_airhockey.render.renderer import Renderer
 from marl_airhockey.render.video import write_video
 
 EVERY = 2
@@ -32,7 +33,7 @@ def film(recording: Path, video: Path, width: int = 640) -> None:
     name = meta["court"]["scenario"]
     scenario = make_scenario(name, **meta["options"])
     scene = scenario.scene
-    blank = still_state(scene.bodies, 1, len(scene.goal_lines)).map(lambda x: x[0])
+    blank = scene.still_state(1).map(lambda x: x[0])
     trails: list[deque[tuple[float, float]]] = [
         deque(maxlen=Renderer.TRAIL) for _ in range(scene.pucks)
     ]

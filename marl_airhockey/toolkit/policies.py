@@ -17,6 +17,12 @@ from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.types import Array
 
 Predict = Callable[[Any, bool], Array]
+RUN_FORMAT = 2
+"""Format of a run's folder, in its ``config.toml`` and in the card of its zips.
+
+Raised whenever classes that a run pickles, or settings that it names, move: runs of
+another format are refused.
+"""
 KINDS = ("zip", "npz")
 """What engines write: stable-baselines3 files, frozen ones."""
 
@@ -84,6 +90,20 @@ def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
     )
 
 
+def check_run_format(source: Path, found: int) -> None:
+    """Refuse a run of another format than `RUN_FORMAT`.
+
+    Raises:
+        ValueError: another format.
+    """
+    if found != RUN_FORMAT:
+        raise ValueError(
+            f"{source}: this run was begun by another version of marl_airhockey (run "
+            f"format {found}, this version reads {RUN_FORMAT}); train it anew in "
+            "another folder"
+        )
+
+
 def frozen_policy(frozen: Frozen, source: str, deterministic: bool = True) -> Policy:
     """A frozen network as a driver."""
     return Policy(
@@ -107,6 +127,8 @@ def _load_sb3(path: Path, deterministic: bool) -> Policy:
         module = data["policy_class"]["__module__"]
     except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{wrong} ({error})") from error
+    if "card" in data:  # of our own training
+        check_run_format(path, data["card"].get("run_format", 1))
     families: dict[str, Any] = {"sac": sb3.SAC, "td3": sb3.TD3, "common": sb3.PPO}
     kinds = [kind for name, kind in families.items() if f".{name}." in module]
     if not kinds:

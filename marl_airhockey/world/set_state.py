@@ -10,7 +10,7 @@ import numpy as np
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.types import Memory
 
 
 def settled(state: State, scene: Scene, count: int) -> State:

@@ -56,7 +56,7 @@ class Space:
         self.banked = np.zeros((bodies.pucks, table_sides), np.int64)
         self.crossed = np.zeros((bodies.pucks, lines), np.bool_)
         self.crossed_velocity = np.zeros((bodies.pucks, lines, 2))
-        self._bodies, self._walls = Bodies(space, scene), Walls(space, scene)
+        self.bodies, self._walls = Bodies(space, scene), Walls(space, scene)
         self._sides, self._substep = sides(scene), 0
         self._out: dict[int, tuple[float, float]] = {}
         """Where pucks went that are out of play, m."""
@@ -80,18 +80,16 @@ class Space:
         bodies, half = self.scene.bodies, self.scene.block_radius
         for shape in self._walls.all:
             shape.elasticity = values["wall_restitution"]
-        for shape in self._bodies.shapes[bodies.paddle]:
+        for shape in self.bodies.shapes[bodies.paddle]:
             shape.elasticity = values["paddle_restitution"]
-        for body in self._bodies.all[bodies.puck]:
+        for body in self.bodies.all[bodies.puck]:
             body.mass = values["puck_mass"]
         mass, grip = values["block_mass"], values["block_friction"]
-        for i, body in enumerate(self._bodies.all[bodies.block]):
-            self._bodies.shapes[bodies.block][i].elasticity = values[
-                "block_restitution"
-            ]
+        for i, body in enumerate(self.bodies.all[bodies.block]):
+            self.bodies.shapes[bodies.block][i].elasticity = values["block_restitution"]
             body.mass = mass
-            self._bodies.grips[2 * i].max_force = mass * grip
-            self._bodies.grips[2 * i + 1].max_force = mass * grip * ARM * half
+            self.bodies.grips[2 * i].max_force = mass * grip
+            self.bodies.grips[2 * i + 1].max_force = mass * grip * ARM * half
             if self.scene.block_shape == "square":
                 body.moment = mass * (2 * half) ** 2 / 6
 
@@ -103,10 +101,10 @@ class Space:
         Shapes are added anew in their order, so that no contact of before lives on in
         Chipmunk's caches and the same start gives the same episode.
         """
-        self.space.remove(*self._bodies.shapes)
-        self.space.add(*self._bodies.shapes)
+        self.space.remove(*self.bodies.shapes)
+        self.space.add(*self.bodies.shapes)
         pucks = self.scene.bodies.puck
-        for i, body in enumerate(self._bodies.all):
+        for i, body in enumerate(self.bodies.all):
             x, y = position[i].tolist()
             vx, vy = velocity[i].tolist()
             ahead = self.leapfrog_offset * (pucks.start <= i < pucks.stop)
@@ -150,7 +148,7 @@ class Space:
             self._substep, left = k, self.substeps - k
             motion = position, velocity, goal, imposed, lifted, left, self.dt, size
             met = ramp_paddles(*motion, mean)
-            for i, body in enumerate(self._bodies.all[seats]):
+            for i, body in enumerate(self.bodies.all[seats]):
                 body.velocity = tuple(mean[i].tolist())
                 if met:
                     body.position = tuple((position[i] - mean[i] * self.dt).tolist())
@@ -165,7 +163,7 @@ class Space:
     def read(self, rows: Array) -> None:
         """Fill (movers, 4) with x, y, vx, vy of every body."""
         pucks = self.scene.bodies.puck
-        for i, body in enumerate(self._bodies.all):
+        for i, body in enumerate(self.bodies.all):
             rows[i, :2], rows[i, 2:] = body.position, body.velocity
         rows[pucks, 2] += self.leapfrog_offset
         for k, place in self._out.items():
@@ -174,7 +172,7 @@ class Space:
     def read_angles(self, angle: Array, spin: Array) -> None:
         """Fill (N,) rad and (N,) rad/s of the blocks."""
         for i in range(self.scene.bodies.block.start, self.scene.bodies.block.stop):
-            body = self._bodies.all[i]
+            body = self.bodies.all[i]
             angle[i], spin[i] = body.angle, body.angular_velocity
 
     def close_goals(self, closed: Array) -> None:
@@ -194,7 +192,7 @@ class Space:
 
     def _lift(self, lifted: Array) -> None:
         """Take paddles (paddles,) bool off the table, and put the others back."""
-        for shape, up in zip(self._bodies.shapes, lifted.tolist(), strict=False):
+        for shape, up in zip(self.bodies.shapes, lifted.tolist(), strict=False):
             wanted = NOTHING if up else EVERYTHING
             if shape.filter != wanted:
                 shape.filter = wanted
@@ -213,11 +211,11 @@ class Space:
 
     def _cross(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         puck, shape = self._ordered(arbiter, PUCK)
-        k, index = self._bodies.index[puck], self._walls.goal_line[shape]
+        k, index = self.bodies.index[puck], self._walls.goal_line[shape]
         if k in self._out or not self._bounces(k, shape):
             return
         self._contact = True
-        body = self._bodies.all[self.scene.bodies.puck.start + k]
+        body = self.bodies.all[self.scene.bodies.puck.start + k]
         velocity = body.velocity.x + self.leapfrog_offset, body.velocity.y
         self.crossed[k, index], self.crossed_velocity[k, index] = True, velocity
         if self.scene.goal_lines[index].width is not None:
@@ -225,7 +223,7 @@ class Space:
 
     def _bank(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         puck, shape = self._ordered(arbiter, PUCK)
-        self._bounces(self._bodies.index[puck], shape)
+        self._bounces(self.bodies.index[puck], shape)
 
     def _bounces(self, k: int, shape: pymunk.Shape) -> bool:
         """Count a bounce of puck k off a wall; False if it has touched it for long."""
@@ -252,7 +250,7 @@ class Space:
 
     def _pair(self, arbiter: pymunk.Arbiter, kind: int) -> tuple[int, int]:
         a, b = self._ordered(arbiter, kind)
-        return self._bodies.index[a], self._bodies.index[b]
+        return self.bodies.index[a], self.bodies.index[b]
 
     def _settle(self) -> None:
         """After a contact: no puck in a wall, above the cap, or in a goal in play."""
@@ -262,7 +260,7 @@ class Space:
             self.leapfrog_offset,
         )
         radius = table.puck_radius
-        for k, puck in enumerate(self._bodies.all[bodies.puck]):
+        for k, puck in enumerate(self.bodies.all[bodies.puck]):
             if k in self._out:
                 self._park(k)
                 continue
@@ -274,10 +272,10 @@ class Space:
             x, y = puck.position
             if wall(self._sides, radius, x, y, SQUEEZE) < 0:
                 continue
-            paddles = np.array([p.position for p in self._bodies.all[bodies.paddle]])
+            paddles = np.array([p.position for p in self.bodies.all[bodies.paddle]])
             touch = radius + table.paddle_radius
             puck.position = slide_out(self._sides, radius, x, y, paddles, touch)
 
     def _park(self, k: int) -> None:
-        body = self._bodies.all[self.scene.bodies.puck.start + k]
+        body = self.bodies.all[self.scene.bodies.puck.start + k]
         body.position, body.velocity = (POCKET * (1 + k), POCKET), (0.0, 0.0)

@@ -115,9 +115,11 @@ class RobosuiteBackend(Backend):
             ways=np.array([scene.opening(m) for m in goal_lines]).reshape(-1, 2, 2),
             whole=np.array([m.width is None for m in goal_lines], np.bool_),
         )
+        moments = substeps + 1 if scene.path else 0
+        path = moments, scene.bodies.movers, 4
         self.trace = np.zeros((num_worlds, substeps, len(scene.seats), len(TRACE)))
         self.worlds = [
-            Arms(env, copy.copy(model), self._path_shape[1:], self.trace[i], data)
+            Arms(env, copy.copy(model), path, self.trace[i], data)
             for i in range(num_worlds)
         ]
         self._last_goal = np.zeros((num_worlds, len(scene.seats), 2))
@@ -186,7 +188,8 @@ class RobosuiteBackend(Backend):
     def _goal(self, command: Command, before: State) -> Array:
         """(B, seats, 2) m/s that arms are to reach; prescribed ones at top speed."""
         goal = np.zeros(command.velocity.shape)
-        imposed, lifted = np.zeros((2, *goal.shape[:2]), np.bool_)
+        seats = goal.shape[:2]
+        imposed, lifted = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
         motion = command.velocity, command.prescribed, before.position
         follow(*motion, self.control_dt, goal, imposed, lifted)
         top = np.array([seat.speed for seat in self.scene.seats])[:, None]

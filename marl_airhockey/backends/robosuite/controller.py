@@ -9,7 +9,7 @@ import numpy as np
 
 from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.backends.robosuite.osc import Gains, reference, torques
-from marl_airhockey.core.limits import limits
+from marl_airhockey.core.limits import INFINITE, Limited, limits_stage
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.types import Array
@@ -49,7 +49,7 @@ class SeatController:
         self._reach = ReachPlanes.of(scene.table, (self.seat,))
         self.start, self.old, self.new = np.zeros((3, 2))
         self._steps = 0
-        self._pushed = np.zeros((1, 1, 2))
+        self._acceleration = np.zeros((1, 1, 2))
 
     def bind(
         self, model: Any, data: Any, site: int, dofs: Any, low: Array, high: Array
@@ -65,7 +65,7 @@ class SeatController:
     def rest(self) -> None:
         """Hold the paddle where it is."""
         self.start, self.old, self.new = self.position[:2], np.zeros(2), np.zeros(2)
-        self._pushed[:] = 0.0
+        self._acceleration[:] = 0.0
 
     @property
     def position(self) -> Array:
@@ -82,18 +82,21 @@ class SeatController:
 
     def ask(self, action: Array) -> None:
         """Take an action (2,): a share of the top speed, in the ego frame."""
-        command = limits(
-            action[None, None],
-            self.position[None, None, :2],
-            self.velocity[None, None, :2],
-            self._pushed,
+        place = self.position[None, None, :2].copy()
+        limited, top = Limited.empty(1, 1), (self.seat.speed, self.seat.acceleration)
+        stage = limits_stage(
+            np.ascontiguousarray(action[None, None]),
+            np.full((1, 1, 4), np.nan),
+            (place, self.velocity[None, None, :2].copy(), self._acceleration),
             self._reach,
-            np.full(1, self.seat.speed),
-            np.full(1, self.seat.acceleration),
+            (np.full(1, top[0]), np.full(1, top[1])),
             self.period,
+            limited,
         )
-        self._pushed = command.pushed
-        self.go(command.velocity[0, 0])
+        if not stage():
+            raise ValueError(INFINITE)
+        self._acceleration = limited.acceleration
+        self.go(limited.velocity[0, 0])
 
     def go(self, velocity: Array) -> None:
         """Ramp to a velocity (2,), m/s in the table frame, within the next period."""

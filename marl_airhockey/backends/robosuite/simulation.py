@@ -11,9 +11,9 @@ from marl_airhockey.backends.robosuite.controller import limit_lead
 from marl_airhockey.backends.robosuite.inverse_kinematics import reach_for
 from marl_airhockey.backends.robosuite.osc import Gains, reference
 from marl_airhockey.backends.robosuite.stepper import (
-    StepOutput,
     Simulation,
     StaticScene,
+    StepOutput,
     fresh,
 )
 from marl_airhockey.backends.robosuite.table_physics import Surface
@@ -112,7 +112,7 @@ class Arms:
         self.surface.set_physics(values)
 
     def reset(
-        self, table: StaticScene, position: Array, velocity: Array, angle: Array
+        self, static: StaticScene, position: Array, velocity: Array, angle: Array
     ) -> bool:
         """Place all bodies; whether arms were moved, which are at rest then.
 
@@ -134,7 +134,7 @@ class Arms:
             for puck in np.flatnonzero(self._out).tolist():
                 self.surface.put_out(puck, False)
             self._out[:] = False
-        fresh(self.sim, table, self.output)
+        fresh(self.sim, static, self.output)
         if moved:
             self._ahead[:] = self.output.paddles[:, :2]
         return moved

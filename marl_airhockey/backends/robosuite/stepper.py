@@ -14,7 +14,7 @@ from marl_airhockey.backends.robosuite.mujoco_c import (
     step1,
     step2,
 )
-from marl_airhockey.backends.robosuite.osc import subtract_payload, reference, torques
+from marl_airhockey.backends.robosuite.osc import reference, subtract_payload, torques
 from marl_airhockey.backends.robosuite.table_physics import slide
 from marl_airhockey.types import Array
 
