@@ -21,7 +21,7 @@ from marl_airhockey.learn.sb3 import build_model
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.roster import Roster
 
@@ -213,7 +213,7 @@ def test_a_frozen_policy_is_one_small_file(tmp_path):
     )
     (tmp_path / "bad.npz").write_bytes(b"nothing")
     with pytest.raises(ValueError, match="no frozen policy"):
-        Frozen.load(tmp_path / "bad.npz")
+        NumpyPolicy.load(tmp_path / "bad.npz")
 
 
 def test_a_best_response_is_learned_against_one_player(tmp_path):

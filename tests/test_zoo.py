@@ -9,14 +9,14 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.registry import ZOO, make_agent, zoo_names
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 
 
 @pytest.mark.parametrize("name", zoo_names())
 def test_it_is_small_and_as_good_as_its_card(name):
     path = ZOO / f"{name[4:]}.npz"
     assert path.stat().st_size < 300_000
-    card = Frozen.load(path).card
+    card = NumpyPolicy.load(path).card
     assert card["version"] == ah.make_scenario(card["scenario"]).version
     assert card["command"].startswith(f"airhockey train {card['scenario']} --seed")
     assert card["date"] >= "2026-11-21"

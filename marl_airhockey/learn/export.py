@@ -18,8 +18,8 @@ from marl_airhockey.learn.config import TrainConfig, load_config, preset
 from marl_airhockey.learn.network import to_numpy
 from marl_airhockey.learn.run import Progress
 from marl_airhockey.registry import make_agent, make_scenario
-from marl_airhockey.toolkit.numpy_policy import Frozen
-from marl_airhockey.toolkit.policies import Policy, frozen_policy
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.policies import Policy, policy_driver
 
 EPISODES = 1000
 """Episodes by which a task's policy is measured"""
@@ -27,7 +27,7 @@ GAMES = 200
 """Games against each rival by which a game's policy is measured"""
 
 
-def export_policy(run: Path, out: Path) -> Frozen:
+def export_policy(run: Path, out: Path) -> NumpyPolicy:
     """Write the last policy of a run as .npz, measured on seeds unseen in training.
 
     Args:
@@ -41,7 +41,7 @@ def export_policy(run: Path, out: Path) -> Frozen:
     if not (run / "state.json").exists():
         raise ValueError(f"{run}: there is no policy in it yet; train it first")
     progress, last = Progress.load(run / "state.json"), _load_last(run)
-    policy = frozen_policy(last, str(run))
+    policy = policy_driver(last, str(run))
     metrics = _games(policy, config) if config.self_play else _episodes(policy, config)
     card = {
         **last.card,
@@ -55,16 +55,16 @@ def export_policy(run: Path, out: Path) -> Frozen:
         "date": datetime.date.today().isoformat(),
         "grades": metrics,
     }
-    frozen = Frozen(last.layers, last.centre, last.unit, last.log_std, card)
+    frozen = NumpyPolicy(last.layers, last.centre, last.unit, last.log_std, card)
     out.parent.mkdir(parents=True, exist_ok=True)
     frozen.save(out)
     return frozen
 
 
-def _load_last(run: Path) -> Frozen:
+def _load_last(run: Path) -> NumpyPolicy:
     """Return the last policy of a run."""
     if (run / "last.npz").exists():
-        return Frozen.load(run / "last.npz")
+        return NumpyPolicy.load(run / "last.npz")
     model = PPO.load(run / "last.zip", device="cpu")
     return to_numpy(model, vars(model)["card"])
 

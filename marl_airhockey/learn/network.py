@@ -13,7 +13,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import RUN_FORMAT
 
 
@@ -60,7 +60,7 @@ def policy_card(config: TrainConfig, env: AirHockeyVecEnv) -> dict[str, Any]:
     }
 
 
-def to_numpy(model: PPO, card: Mapping[str, Any]) -> Frozen:
+def to_numpy(model: PPO, card: Mapping[str, Any]) -> NumpyPolicy:
     """Return the actor of a model of `sb3.build_model` as plain arrays.
 
     Raises:
@@ -81,14 +81,14 @@ def layers_to_numpy(
     scale: FixedScale,
     log_std: torch.Tensor,
     card: Mapping[str, Any],
-) -> Frozen:
+) -> NumpyPolicy:
     """Return linear layers, with rectifiers between them, as plain arrays."""
 
     def array(tensor: torch.Tensor) -> Any:
         return tensor.detach().cpu().numpy().astype(np.float32).copy()
 
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
-    return Frozen(
+    return NumpyPolicy(
         [(array(x.weight), array(x.bias)) for x in linear],
         array(scale.centre),
         array(1.0 / scale.rate),

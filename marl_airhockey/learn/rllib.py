@@ -26,8 +26,8 @@ from marl_airhockey.learn.network import policy_card
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU, ActorCritic, BatchRunner
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import make_training_env
-from marl_airhockey.toolkit.numpy_policy import Frozen
-from marl_airhockey.toolkit.policies import frozen_policy
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.policies import policy_driver
 
 
 def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:
@@ -118,7 +118,7 @@ def train_with_rllib(run: TrainingRun) -> Metrics:
     if progress.steps:
         algo.restore_from_path(_algorithm_state(run))
 
-    def policy() -> Frozen:
+    def policy() -> NumpyPolicy:
         module: ActorCritic = algo.get_module(DEFAULT_MODULE_ID)
         return module.to_numpy()
 
@@ -127,7 +127,7 @@ def train_with_rllib(run: TrainingRun) -> Metrics:
 
     def evaluate() -> Metrics:
         now = policy()
-        metrics = grade(lambda mean: frozen_policy(now, "training", mean), config)
+        metrics = grade(lambda mean: policy_driver(now, "training", mean), config)
         older = list(folder.glob("rllib-*"))
         algo.save_to_path(_algorithm_state(run))
         row = run.record_evaluation(metrics, save)

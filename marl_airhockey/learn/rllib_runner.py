@@ -20,7 +20,7 @@ from ray.rllib.env.utils.infinite_lookback_buffer import InfiniteLookbackBuffer
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.network import FixedScale, layers_to_numpy
 from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.types import Array
 
 RUNNER_CPU = "runner_cpu_seconds"
@@ -53,7 +53,7 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
     get_exploration_action_dist_cls = get_train_action_dist_cls
     get_inference_action_dist_cls = get_train_action_dist_cls
 
-    def to_numpy(self) -> Frozen:
+    def to_numpy(self) -> NumpyPolicy:
         """Return the actor as plain arrays."""
         return layers_to_numpy(
             self.actor, self.scale, self.log_std, self.model_config["card"]

@@ -14,7 +14,7 @@ from marl_airhockey.learn.grade import Metrics, grade
 from marl_airhockey.learn.network import to_numpy
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import Policy
 
 
@@ -59,7 +59,7 @@ class TrainingCallback(BaseCallback):
         # The first snapshot is due at once: self-play needs an opponent.
         self._snapshot_due = run.progress.steps
 
-    def _to_numpy(self) -> Frozen:
+    def _to_numpy(self) -> NumpyPolicy:
         """Return the policy as it is."""
         assert isinstance(self.model, PPO)
         return to_numpy(self.model, self.card)

@@ -13,8 +13,8 @@ from marl_airhockey.evaluation.games import teams_of
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.make import make_sb3_vec
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.numpy_policy import Frozen
-from marl_airhockey.toolkit.policies import frozen_policy
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.policies import policy_driver
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.episode import StepResult
@@ -93,7 +93,7 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         names = self._roster.names
         return dict(zip(names, self._scores.tolist(), strict=True))
 
-    def snapshot(self, policy: Frozen, steps: int) -> None:
+    def snapshot(self, policy: NumpyPolicy, steps: int) -> None:
         """Add the learner as it is to the pool.
 
         In a full pool it replaces the snapshot that the learner beats most often.
@@ -108,7 +108,7 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         self._add_opponent(path)
 
     def _add_opponent(self, path: Path) -> None:
-        driver = frozen_policy(Frozen.load(path), str(path), deterministic=False)
+        driver = policy_driver(NumpyPolicy.load(path), str(path), deterministic=False)
         if len(self._snapshots) < self._size:
             self._roster.add(path.stem, driver)
             self._scores = np.append(self._scores, 0.5)

@@ -20,7 +20,7 @@ from marl_airhockey.registry import (
     make_scenario,
     zoo_names,
 )
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.driven_seat import DrivenSeat
@@ -123,7 +123,7 @@ class Court:
         scenario, observer = self.world.scenario, self.world.observer
         found: list[tuple[bool, str]] = []
         for name in zoo_names():
-            card = Frozen.load(ZOO / f"{name[4:]}.npz").card
+            card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
             labels = observer.prepare(card["observe"]).labels
             kind = make_scenario(card["scenario"], **card["options"]).seats
             if (card["scenario"], card["labels"], kind) == (

@@ -1,4 +1,4 @@
-"""A learned policy as plain arrays: one small file, no deep learning library."""
+"""NumPy policy: a learned network as plain arrays, in one small file."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from marl_airhockey.types import Array
 
 
 @dataclass(frozen=True)
-class Frozen:
-    """A network of rectified layers that gives the mean action.
+class NumpyPolicy:
+    """Network of rectified layers that gives the mean action.
 
     Args:
         layers: (out, in) weights and (out,) biases of each layer.
         centre: (D,) taken off the observation.
         unit: (D,) that it is divided by then.
         log_std: (2,) of the action noise in training.
-        card: what it is: scenario and its version, how it was trained, how good it is.
+        card: scenario and its version, how it was trained, how good it is.
     """
 
     layers: Sequence[tuple[Array, Array]]
@@ -31,8 +31,8 @@ class Frozen:
     log_std: Array
     card: Mapping[str, Any] = field(default_factory=dict)
 
-    def __call__(self, observation: Array) -> Array:
-        """(B, 2) mean actions for observations (B, D)."""
+    def __call__(self, observation: Array, deterministic: bool = True) -> Array:
+        """Return (B, 2) mean actions for observations (B, D); noise is the driver's."""
         x = (observation - self.centre) / self.unit
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)
@@ -57,8 +57,8 @@ class Frozen:
         draft.replace(path)
 
     @staticmethod
-    def load(path: Path) -> Frozen:
-        """Read what `save` wrote.
+    def load(path: Path) -> NumpyPolicy:
+        """Read a file that `save` wrote.
 
         Raises:
             ValueError: not such a file.
@@ -69,6 +69,6 @@ class Frozen:
                 pairs = [(file[f"weight_{i}"], file[f"bias_{i}"]) for i in range(count)]
                 card = json.loads(str(file["card"]))
                 parts = file["centre"], file["unit"], file["log_std"]
-                return Frozen(pairs, *parts, card)
+                return NumpyPolicy(pairs, *parts, card)
         except (KeyError, OSError, ValueError) as error:
-            raise ValueError(f"{path} is no frozen policy: {error}") from error
+            raise ValueError(f"{path} is no policy of ours: {error}") from error

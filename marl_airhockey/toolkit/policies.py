@@ -1,4 +1,4 @@
-"""Policies from files: what `train` saved, any SB3 zip, ONNX and frozen ones."""
+"""Policies from files: runs of `train`, any SB3 zip, ONNX models and .npz files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import require
-from marl_airhockey.toolkit.numpy_policy import Frozen
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.types import Array
 
 Predict = Callable[[Any, bool], Array]
@@ -24,12 +25,12 @@ Raised whenever classes that a run pickles, or settings that it names, move: run
 another format are refused.
 """
 KINDS = ("zip", "npz")
-"""What engines write: stable-baselines3 files, frozen ones."""
+"""Endings of the files that engines write."""
 
 
 @dataclass
 class Policy(Driver):
-    """A learned policy as a driver.
+    """Learned policy as a driver.
 
     Args:
         predict: observation (B, ...) and whether to be deterministic -> (B, 2).
@@ -64,7 +65,7 @@ class Policy(Driver):
 
 
 def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
-    """Load a policy: a run folder of `train`, an SB3 .zip, an .onnx or a frozen .npz.
+    """Load a policy: a run folder of `train`, an SB3 .zip, an .onnx or an .npz.
 
     An SB3 zip holds pickled Python: load only files that you trust.
 
@@ -79,14 +80,14 @@ def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
     if not path.exists():
         raise ValueError(f"{path}: there is no such policy file")
     if path.suffix == ".npz":
-        return frozen_policy(Frozen.load(path), str(path), deterministic)
+        return policy_driver(NumpyPolicy.load(path), str(path), deterministic)
     if path.suffix == ".onnx":
         return _load_onnx(path, deterministic)
     if path.suffix == ".zip":
         return _load_sb3(path, deterministic)
     raise ValueError(
-        f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file or a "
-        "frozen .npz"
+        f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file or an "
+        ".npz"
     )
 
 
@@ -104,15 +105,17 @@ def check_run_format(source: Path, found: int) -> None:
         )
 
 
-def frozen_policy(frozen: Frozen, source: str, deterministic: bool = True) -> Policy:
-    """A frozen network as a driver."""
+def policy_driver(
+    policy: NumpyPolicy, source: str, deterministic: bool = True
+) -> Policy:
+    """Return a NumPy policy as a driver."""
     return Policy(
-        lambda observation, _: frozen(observation),
-        frozen.centre.shape,
-        frozen.card.get("observe"),
+        policy,
+        policy.centre.shape,
+        policy.card.get("observe"),
         source,
         deterministic,
-        np.exp(frozen.log_std),
+        np.exp(policy.log_std),
     )
 
 
@@ -143,11 +146,8 @@ def _load_sb3(path: Path, deterministic: bool) -> Policy:
         raise ValueError(f"{path}: its action space is {model.action_space}, not (2,)")
     card = getattr(model, "card", {})
 
-    def predict(observation: Any, mean: bool) -> Array:
-        return np.asarray(model.predict(observation, deterministic=mean)[0])
-
     return Policy(
-        predict,
+        partial(_predict_sb3, model.policy),
         model.observation_space.shape,
         card.get("observe"),
         str(path),
@@ -155,31 +155,54 @@ def _load_sb3(path: Path, deterministic: bool) -> Policy:
     )
 
 
-def _load_onnx(path: Path, deterministic: bool) -> Policy:
-    require("onnxruntime", "offline")
-    import onnxruntime
+def _predict_sb3(policy: Any, observation: Any, deterministic: bool) -> Array:
+    return np.asarray(policy.predict(observation, deterministic=deterministic)[0])
 
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    try:
-        session = onnxruntime.InferenceSession(
-            str(path), options, providers=["CPUExecutionProvider"]
+
+class _OnnxModel:
+    """ONNX model; copies and pickles hold its bytes and open a session anew."""
+
+    def __init__(self, source: str, content: bytes) -> None:
+        self._source, self._content = source, content
+        self._open()
+
+    def __getstate__(self) -> tuple[str, bytes]:
+        return self._source, self._content
+
+    def __setstate__(self, state: tuple[str, bytes]) -> None:
+        self._source, self._content = state
+        self._open()
+
+    def _open(self) -> None:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        self._session = onnxruntime.InferenceSession(
+            self._content, options, providers=["CPUExecutionProvider"]
         )
-    except Exception as error:
-        raise ValueError(f"{path}: not an ONNX model: {error}") from error
-    inputs = session.get_inputs()
-    if len(inputs) != 1:
-        raise ValueError(f"{path}: expected one input, found {len(inputs)}")
-    shape = tuple(n for n in inputs[0].shape[1:] if isinstance(n, int))
+        self.inputs = self._session.get_inputs()
 
-    def predict(observation: Any, mean: bool) -> Array:
+    def __call__(self, observation: Any, deterministic: bool) -> Array:
         rows = np.asarray(observation, np.float32)
-        out = np.asarray(session.run(None, {inputs[0].name: rows})[0])
+        out = np.asarray(self._session.run(None, {self.inputs[0].name: rows})[0])
         if out.shape != (len(rows), 2):
             raise ValueError(
-                f"{path}: expected actions of shape {(len(rows), 2)}, got {out.shape}"
+                f"{self._source}: expected actions of shape {(len(rows), 2)}, got "
+                f"{out.shape}"
             )
         return out
 
-    known = shape if len(shape) == len(inputs[0].shape) - 1 else None
-    return Policy(predict, known, None, str(path), deterministic)
+
+def _load_onnx(path: Path, deterministic: bool) -> Policy:
+    require("onnxruntime", "offline")
+    try:
+        model = _OnnxModel(str(path), path.read_bytes())
+    except Exception as error:
+        raise ValueError(f"{path}: not an ONNX model: {error}") from error
+    if len(model.inputs) != 1:
+        raise ValueError(f"{path}: expected one input, found {len(model.inputs)}")
+    sizes = model.inputs[0].shape[1:]
+    shape = tuple(n for n in sizes if isinstance(n, int))
+    known = shape if len(shape) == len(sizes) else None
+    return Policy(model, known, None, str(path), deterministic)

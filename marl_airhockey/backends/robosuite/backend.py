@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from marl_airhockey.backends._planar.paddles import follow
+from marl_airhockey.backends._planar.walls import sides
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.core.scene import Scene
@@ -113,6 +114,7 @@ class RobosuiteBackend(Backend):
             ),
             offsets=np.array([scene.table.offsets[m.side] for m in goal_lines]),
             ways=np.array([scene.opening(m) for m in goal_lines]).reshape(-1, 2, 2),
+            sides=sides(scene),
             whole=np.array([m.width is None for m in goal_lines], np.bool_),
         )
         moments = substeps + 1 if scene.path else 0

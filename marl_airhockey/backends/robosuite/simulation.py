@@ -84,11 +84,14 @@ class Arms:
         )
         pairs, goal_lines = (self._seats, self._pucks), len(scene.goal_lines)
         crossings = self._pucks, goal_lines
+        banks = self._pucks, len(scene.table.vertices)
         self.output = StepOutput(
             np.zeros((self._seats, 4)),
             np.zeros(pairs, np.int64),
             np.zeros(pairs),
             np.zeros(pairs, np.bool_),
+            np.zeros(banks, np.int64),
+            np.zeros(banks, np.bool_),
             np.zeros(crossings, np.bool_),
             np.zeros((*crossings, 2)),
             np.zeros(crossings, np.bool_),

@@ -22,6 +22,9 @@ TRACE = ("height", "tilt", "force", "joint_speed", "share", "speed")
 """Of a paddle at every physics step: m above the table, rad off its orientation, N on
 the table, rad/s of the fastest joint, share of the motion that torques allow, m/s."""
 
+REST = 0.001
+"""m: a puck that leaves a rail by less than this still touches it."""
+
 
 class Simulation(NamedTuple):
     """One world's MuJoCo arrays (views, not copies), and where its parts are."""
@@ -75,6 +78,8 @@ class StaticScene(NamedTuple):
     """(goal lines,) m"""
     ways: Array
     """(goal lines, 2, 2) ends of their openings, m"""
+    sides: Array
+    """(sides, 6) see `walls.sides`"""
     whole: Array
     """(goal lines,) a whole side, which a puck crosses by touching it"""
 
@@ -88,6 +93,10 @@ class StepOutput(NamedTuple):
     touched_at: Array
     touching: Array
     """(seats, pucks), kept from step to step"""
+    banked: Array
+    """(pucks, sides)"""
+    against: Array
+    """(pucks, sides) bool: the puck touches the rail of that side, kept"""
     crossed: Array
     crossed_velocity: Array
     beyond: Array
@@ -125,7 +134,7 @@ def advance(
     jacobian, rate, mass = np.empty((6, nv)), np.empty((6, nv)), np.empty((nv, nv))
     wanted, out, drift = np.empty((3, 2)), np.empty(6), np.empty(6)
     output.touched[:], output.touched_at[:], output.crossed[:] = 0, np.nan, False
-    output.crossed_velocity[:] = 0.0
+    output.crossed_velocity[:], output.banked[:] = 0.0, 0
     if len(output.path):
         _record(sim, output, 0)
     for k in range(substeps):
@@ -247,6 +256,15 @@ def _events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
                 output.touched[s, p] += 1
                 output.touched_at[s, p] = elapsed
             output.touching[s, p] = meets
+        for s in range(len(static.sides)):
+            nx, ny, offset, mx, my, half = static.sides[s]
+            aside = nx * (y - my) - ny * (x - mx)
+            # What rests on a rail sinks into it and rises by less than this.
+            near = static.radius[1] + (REST if output.against[p, s] else 0.0)
+            leans = nx * x + ny * y + offset < near and abs(aside) >= half
+            if leans and not output.against[p, s]:
+                output.banked[p, s] += 1
+            output.against[p, s] = leans
         for m in range(len(static.offsets)):
             nx, ny = static.normals[m, 0], static.normals[m, 1]
             inside = nx * x + ny * y + static.offsets[m]
