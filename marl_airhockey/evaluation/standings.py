@@ -108,7 +108,7 @@ class Standings:
         for r in self.rows():
             lines.append(
                 f"| {r['player']} | {r['elo']:.0f} ({r['elo_low']:.0f}.."
-                f"{r['elo_high']:.0f}) | {r['score']:.3f} | {r['wins']} | {r['rng']}"
+                f"{r['elo_high']:.0f}) | {r['score']:.3f} | {r['wins']} | {r['draws']}"
                 f" | {r['losses']} | {r['goal_difference']:+.2f} |"
             )
         lines += ["", *(f"Circle: {' > '.join((*c, c[0]))}" for c in self.circles)]
