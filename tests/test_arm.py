@@ -12,7 +12,7 @@ from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.jit.threads import use_threads
-from marl_airhockey.play.live_match import RATE, Court
+from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import find_backend
 
@@ -307,16 +307,16 @@ def test_it_is_seen_from_three_cameras():
 
 
 def test_a_person_moves_an_arm():
-    court = Court("juggle", {}, {"backend": "robosuite"}, seed=0)
-    session = Session(court)
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    session.hear(guest, aim(-0.5, 0.15))
-    session.hear(guest, line("start"))
+    match = LiveMatch("juggle", {}, {"backend": "robosuite"}, seed=0)
+    session = Session(match)
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session.receive(client, aim(-0.5, 0.15))
+    session.receive(client, line("start"))
     for _ in range(5 * RATE):
         session.tick()
-    np.testing.assert_allclose(court.world.state.paddle[0, 0], (-0.5, 0.15), atol=0.01)
-    court.close()
+    np.testing.assert_allclose(match.world.state.paddle[0, 0], (-0.5, 0.15), atol=0.01)
+    match.close()
 
 
 def test_what_is_missing_is_named_with_its_fix(monkeypatch):

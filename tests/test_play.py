@@ -1,4 +1,4 @@
-"""Playing in the browser: the court, the people at it, the server, the page."""
+"""Playing in the browser: the match, the people at it, the server, the page."""
 
 import asyncio
 import contextlib
@@ -18,15 +18,16 @@ from pages import aim, line, page_at, running, state_of, wait
 from PIL import Image
 
 from marl_airhockey.evaluation.recordings import read
-from marl_airhockey.play.handicap import STRENGTHS, Fairness
-from marl_airhockey.play.live_match import RATE, Court
-from marl_airhockey.play.measures import _comes, _reactions
-from marl_airhockey.play.protocol import BURST, LARGEST, Meter, parse
+from marl_airhockey.play.handicap import PRESETS, Handicap
+from marl_airhockey.play.live_match import RATE, LiveMatch
+from marl_airhockey.play.measures import interceptions, reactions
+from marl_airhockey.play.plots import plot_report
+from marl_airhockey.play.protocol import BURST, LARGEST, RateLimiter, parse
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.play.report import report
+from marl_airhockey.play.report import summarize
 from marl_airhockey.play.server import listen as listen_at
 from marl_airhockey.play.session import IDLE, Session
-from marl_airhockey.play.video import film
+from marl_airhockey.play.video import write_recording_video
 from marl_airhockey.registry import scenario_names
 
 BAD = [
@@ -64,153 +65,153 @@ def test_a_bad_message_is_named(text):
 
 
 def test_chatter_is_cut_short():
-    meter = Meter(0.0)
+    limiter = RateLimiter(0.0)
     for _ in range(int(BURST)):
-        meter.take(0.0)
+        limiter.acquire(0.0)
     with pytest.raises(ValueError, match="messages a second"):
-        meter.take(0.0)
-    meter.take(1.0)
+        limiter.acquire(0.0)
+    limiter.acquire(1.0)
 
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_every_scenario_is_played_and_drawn(name):
-    court = Court(name, {}, {}, seed=3)
-    assert court.who == ["person"] * len(court.seats)
-    court.start()
+    match = LiveMatch(name, {}, {}, seed=3)
+    assert match.drivers.names == ["person"] * len(match.seats)
+    match.start()
     for _ in range(4 * RATE):
-        court.tick()
-    assert court.ticks > 0
-    assert json.loads(json.dumps(court.state()))["phase"] in ("play", "done")
-    described = json.loads(json.dumps(court.describe()))
-    assert len(described["seats"]) == len(court.seats)
+        match.tick()
+    assert match.ticks > 0
+    assert json.loads(json.dumps(match.state()))["phase"] in ("play", "done")
+    described = json.loads(json.dumps(match.describe()))
+    assert len(described["seats"]) == len(match.seats)
 
 
 def test_a_pointer_moves_its_paddle_and_stays_within_the_limits():
-    court = Court("duel", {"paddle_0": "still"}, {}, seed=1)
-    session = Session(court)
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    assert guest.seat == 1
-    session.hear(guest, aim(0.4, 0.2))
-    session.hear(guest, line("start"))
+    match = LiveMatch("duel", {"paddle_0": "still"}, {}, seed=1)
+    session = Session(match)
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    assert client.seat == 1
+    session.receive(client, aim(0.4, 0.2))
+    session.receive(client, line("start"))
     for _ in range(5 * RATE):
         session.tick()
-        speed = np.hypot(*court.world.state.paddle_velocity[0, 1])
-        assert speed <= court.seats[1].speed + 1e-6
-    np.testing.assert_allclose(court.world.state.paddle[0, 1], (0.4, 0.2), atol=0.01)
-    session.hear(guest, aim(-0.4, 0.0))
+        speed = np.hypot(*match.world.state.paddle_velocity[0, 1])
+        assert speed <= match.seats[1].speed + 1e-6
+    np.testing.assert_allclose(match.world.state.paddle[0, 1], (0.4, 0.2), atol=0.01)
+    session.receive(client, aim(-0.4, 0.0))
     for _ in range(RATE):
         session.tick()
-    assert court.world.state.paddle[0, 1, 0] > 0.0, "not into the other's half"
-    frame = json.loads(guest.frame)
+    assert match.world.state.paddle[0, 1, 0] > 0.0, "not into the other's half"
+    frame = json.loads(client.frame)
     assert frame["seat"] == 1
     assert frame["ack"] == 1
 
 
 def test_a_stick_is_a_velocity():
-    court = Court("duel", {"paddle_1": "still"}, {}, seed=1)
-    session = Session(court)
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    session.hear(guest, line("start"))
-    while court.phase != "play":
+    match = LiveMatch("duel", {"paddle_1": "still"}, {}, seed=1)
+    session = Session(match)
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session.receive(client, line("start"))
+    while match.phase != "play":
         session.tick()
-    before = court.world.state.paddle[0, 0].copy()
-    session.hear(guest, line("stick", x=0.0, y=-0.5, q=1, rtt=0))
+    before = match.world.state.paddle[0, 0].copy()
+    session.receive(client, line("stick", x=0.0, y=-0.5, q=1, rtt=0))
     for _ in range(6):
         session.tick()
-    moved = court.world.state.paddle[0, 0] - before
+    moved = match.world.state.paddle[0, 0] - before
     assert moved[1] < -0.02
     assert abs(moved[0]) < 1e-9
-    session.hear(guest, line("stick", x=0.05, y=0.0, q=2, rtt=0))
+    session.receive(client, line("stick", x=0.05, y=0.0, q=2, rtt=0))
     for _ in range(20):
         session.tick()
-    assert np.hypot(*court.world.state.paddle_velocity[0, 0]) < 1e-6, "dead zone"
+    assert np.hypot(*match.world.state.paddle_velocity[0, 0]) < 1e-6, "dead zone"
 
 
 def test_two_people_and_a_watcher():
-    court = Court("duel", {}, {}, seed=1)
-    session = Session(court)
-    guests = [session.join() for _ in range(3)]
-    for i, guest in enumerate(guests):
-        session.hear(guest, line("hello", key=str(i)))
-    assert [guest.seat for guest in guests] == [0, 1, None]
-    watcher = guests[2]
-    session.part(guests[1])
-    session.hear(guests[0], line("start"))
-    assert court.phase == "lobby", "a seat of people is free"
-    guests[1] = session.join()
-    session.hear(guests[1], line("hello", key="1"))
-    assert guests[1].seat == 1
+    match = LiveMatch("duel", {}, {}, seed=1)
+    session = Session(match)
+    clients = [session.connect() for _ in range(3)]
+    for i, client in enumerate(clients):
+        session.receive(client, line("hello", key=str(i)))
+    assert [client.seat for client in clients] == [0, 1, None]
+    watcher = clients[2]
+    session.disconnect(clients[1])
+    session.receive(clients[0], line("start"))
+    assert match.phase == "lobby", "a seat of people is free"
+    clients[1] = session.connect()
+    session.receive(clients[1], line("hello", key="1"))
+    assert clients[1].seat == 1
     for text in (line("start"), line("swap"), aim(0, 0), line("sit", seat=0)):
-        session.hear(watcher, text)
-    assert court.phase == "lobby"
+        session.receive(watcher, text)
+    assert match.phase == "lobby"
     assert watcher.seat is None
-    session.hear(guests[1], line("start"))
+    session.receive(clients[1], line("start"))
     session.tick()
-    assert court.phase == "countdown"
+    assert match.phase == "countdown"
     assert json.loads(watcher.frame)["watching"] == 1
-    session.part(guests[0])
-    assert court.phase == "pause"
-    assert court.reason == "a player has gone"
-    back = session.join()
-    session.hear(back, line("hello", key="0"))
+    session.disconnect(clients[0])
+    assert match.phase == "pause"
+    assert match.reason == "a player has gone"
+    back = session.connect()
+    session.receive(back, line("hello", key="0"))
     assert back.seat == 0, "a page that is loaded again gets its seat back"
-    assert court.phase == "countdown"
-    session.hear(back, line("pause"))
-    session.part(back)
-    back = session.join()
-    session.hear(back, line("hello", key="0"))
-    assert court.phase == "pause", "who paused goes on when they want"
-    session.hear(back, line("stop"))
-    assert court.phase == "done"
-    session.hear(back, line("swap"))
-    assert court.phase == "lobby"
+    assert match.phase == "countdown"
+    session.receive(back, line("pause"))
+    session.disconnect(back)
+    back = session.connect()
+    session.receive(back, line("hello", key="0"))
+    assert match.phase == "pause", "who paused goes on when they want"
+    session.receive(back, line("stop"))
+    assert match.phase == "done"
+    session.receive(back, line("swap"))
+    assert match.phase == "lobby"
 
 
-def test_an_idle_page_lets_go_of_its_seat():
-    session = Session(Court("duel", {}, {}, seed=1))
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    session._let_go(time.monotonic() + IDLE / 2)
-    assert guest.seat == 0
-    session._let_go(time.monotonic() + IDLE + 1)
-    assert guest.seat is None
+def test_an_idle_page_loses_its_seat():
+    session = Session(LiveMatch("duel", {}, {}, seed=1))
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session._check_presence(time.monotonic() + IDLE / 2)
+    assert client.seat == 0
+    session._check_presence(time.monotonic() + IDLE + 1)
+    assert client.seat is None
 
 
 def test_opponents_are_chosen_between_matches_and_ends_change():
-    court = Court("duel", {"paddle_1": "zoo/duel"}, {}, seed=1)
-    session = Session(court)
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    session.hear(guest, line("opponent", seat=1, name="../secret.zip"))
-    assert court.who[1] == "zoo/duel", "only who is offered may be asked"
-    session.hear(guest, line("opponent", seat=1, name="allround:strength=weak"))
-    assert court.who == ["person", "allround:strength=weak"]
-    session.hear(guest, line("strength", name="gentle"))
-    assert court.fairness == STRENGTHS["gentle"]
-    session.hear(guest, line("strength", name="divine"))
-    assert court.fairness == STRENGTHS["gentle"], "only what is offered"
-    session.hear(guest, line("swap"))
-    assert court.who == ["allround:strength=weak", "person"]
-    assert guest.seat == 1
-    session.hear(guest, line("start"))
+    match = LiveMatch("duel", {"paddle_1": "zoo/duel"}, {}, seed=1)
+    session = Session(match)
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session.receive(client, line("opponent", seat=1, name="../secret.zip"))
+    assert match.drivers.names[1] == "zoo/duel", "only who is offered may play"
+    session.receive(client, line("opponent", seat=1, name="allround:strength=weak"))
+    assert match.drivers.names == ["person", "allround:strength=weak"]
+    session.receive(client, line("handicap", name="gentle"))
+    assert match.drivers.handicap == PRESETS["gentle"]
+    session.receive(client, line("handicap", name="divine"))
+    assert match.drivers.handicap == PRESETS["gentle"], "only what is offered"
+    session.receive(client, line("swap"))
+    assert match.drivers.names == ["allround:strength=weak", "person"]
+    assert client.seat == 1
+    session.receive(client, line("start"))
     for _ in range(4 * RATE):
         session.tick()
-    session.hear(guest, line("opponent", seat=0, name="still"))
-    assert court.who[0] == "allround:strength=weak", "not during a match"
+    session.receive(client, line("opponent", seat=0, name="still"))
+    assert match.drivers.names[0] == "allround:strength=weak", "not during a match"
     with pytest.raises(ValueError, match="unknown driver"):
-        Court("duel", {"paddle_1": "nobody"}, {})
+        LiveMatch("duel", {"paddle_1": "nobody"}, {})
     with pytest.raises(ValueError, match="say person"):
-        Court("duel", {"paddle_1": "mouse"}, {})
+        LiveMatch("duel", {"paddle_1": "mouse"}, {})
     with pytest.raises(ValueError, match="path"):
-        Court("duel", {"paddle_1": "policy"}, {})
+        LiveMatch("duel", {"paddle_1": "policy"}, {})
     with pytest.raises(ValueError, match="paddle_7"):
-        Court("duel", {"paddle_7": "still"}, {})
+        LiveMatch("duel", {"paddle_7": "still"}, {})
 
 
 @pytest.mark.parametrize(
-    ("game", "keywords", "house"),
+    ("game", "keywords", "fitting"),
     [
         ("duel", {}, ["zoo/duel"]),
         ("duel", {"options": {"pucks": 2}}, []),
@@ -223,29 +224,31 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
         ("juggle", {}, ["zoo/juggle"]),
     ],
 )
-def test_the_house_offers_who_can_play(game, keywords, house):
-    court = Court(game, {}, keywords, seed=0)
-    assert court.house == house
-    for name in court.choices:
-        court.seat(0, name)
-    if not house:
+def test_policies_that_fit_are_offered(game, keywords, fitting):
+    match = LiveMatch(game, {}, keywords, seed=0)
+    assert match.drivers.fitting_policies == fitting
+    for name in match.drivers.choices:
+        match.set_driver(0, name)
+    if not fitting:
         with pytest.raises(ValueError, match="expects observations"):
-            court.seat(0, f"zoo/{game}")
-        assert court.who[0] == court.choices[-1], "who sat there still does"
+            match.set_driver(0, f"zoo/{game}")
+        assert match.drivers.names[0] == match.drivers.choices[-1], (
+            "who sat there still does"
+        )
 
 
 def test_a_match_whose_players_change_does_not_count(tmp_path):
-    court = Court("duel", {"paddle_1": "still"}, {}, seed=1)
-    session = Session(court, Recorder(tmp_path))
-    first = session.join()
-    session.hear(first, line("hello", key="a"))
-    session.hear(first, line("start"))
+    match = LiveMatch("duel", {"paddle_1": "still"}, {}, seed=1)
+    session = Session(match, Recorder(tmp_path))
+    first = session.connect()
+    session.receive(first, line("hello", key="a"))
+    session.receive(first, line("start"))
     for _ in range(5 * RATE):
         session.tick()
-    session.hear(first, line("leave"))
-    second = session.join()
-    session.hear(second, line("hello", key="b"))
-    session.hear(second, line("start"))
+    session.receive(first, line("leave"))
+    second = session.connect()
+    session.receive(second, line("hello", key="b"))
+    session.receive(second, line("start"))
     for _ in range(5 * RATE):
         session.tick()
     (path,) = tmp_path.iterdir()
@@ -255,84 +258,91 @@ def test_a_match_whose_players_change_does_not_count(tmp_path):
 
 def test_a_match_ends_and_another_begins():
     options = {"options": {"seconds": 2.0}}
-    court = Court("duel", {"paddle_0": "striker", "paddle_1": "still"}, options)
+    match = LiveMatch("duel", {"paddle_0": "striker", "paddle_1": "still"}, options)
     for _ in range(2):
-        court.start()
-        while court.phase != "done":
-            court.tick()
-        assert court.ticks == 2 * RATE
-    assert court.world.episode.number[0] == 2
+        match.start()
+        while match.phase != "done":
+            match.tick()
+        assert match.ticks == 2 * RATE
+    assert match.world.episode.number[0] == 2
 
 
-def test_a_rehearsal_leaves_no_trace():
-    fresh = Court("duel", {"paddle_0": "striker", "paddle_1": "zoo/duel"}, {}, seed=4)
-    other = Court("duel", {"paddle_0": "striker", "paddle_1": "zoo/duel"}, {}, seed=4)
-    other.rehearse()
-    for court in (fresh, other):
-        court.start()
+def test_a_warm_up_leaves_no_trace():
+    fresh = LiveMatch(
+        "duel", {"paddle_0": "striker", "paddle_1": "zoo/duel"}, {}, seed=4
+    )
+    other = LiveMatch(
+        "duel", {"paddle_0": "striker", "paddle_1": "zoo/duel"}, {}, seed=4
+    )
+    other.warm_up()
+    for match in (fresh, other):
+        match.start()
         for _ in range(6 * RATE):
-            court.tick()
+            match.tick()
     assert fresh.state() == other.state()
     assert fresh.number == other.number == 1
 
 
 def test_fair_opponents_act_late_and_slowly():
-    def first_move(fairness):
+    def first_move(handicap):
         seats = {"paddle_0": "striker", "paddle_1": "still"}
-        court = Court("duel", seats, {}, fairness, seed=2)
-        court.start()
+        match = LiveMatch("duel", seats, {}, handicap, seed=2)
+        match.start()
         fastest, began = 0.0, None
         for tick in range(6 * RATE):
-            court.tick()
-            speed = float(np.hypot(*court.world.state.paddle_velocity[0, 0]))
+            match.tick()
+            speed = float(np.hypot(*match.world.state.paddle_velocity[0, 0]))
             fastest = max(fastest, speed)
             if began is None and speed > 0.01:
                 began = tick
         return began, fastest
 
-    at_once, fast = first_move(Fairness())
-    late, slow = first_move(Fairness(reaction=0.2, pace=0.3))
+    at_once, fast = first_move(Handicap())
+    late, slow = first_move(Handicap(reaction=0.2, pace=0.3))
     assert late - at_once == pytest.approx(0.2 * RATE, abs=1)
     assert slow <= 0.3 * 2.5 + 1e-6 < fast
     with pytest.raises(ValueError, match="reaction"):
-        Fairness(reaction=2.0).hold(Court("duel", {}, {})._hands[0])
+        Handicap(reaction=2.0)
 
 
 def test_an_episode_is_recorded_step_by_step(tmp_path):
     options = {"options": {"seconds": 2.0}, "backend": "numba"}
-    court = Court("duel", {"paddle_1": "striker"}, options, seed=5)
-    session = Session(court, Recorder(tmp_path))
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    session.hear(guest, aim(-0.3, 0.1))
-    session.hear(guest, line("start"))
-    while court.phase != "done":
+    match = LiveMatch("duel", {"paddle_1": "striker"}, options, seed=5)
+    session = Session(match, Recorder(tmp_path))
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session.receive(client, aim(-0.3, 0.1))
+    session.receive(client, line("start"))
+    while match.phase != "done":
         session.tick()
     (path,) = tmp_path.iterdir()
     meta, steps, end = read(path)
     assert meta["players"][0] == {
         "seat": 0,
         "driver": "person",
-        "person": guest.name,
+        "person": client.name,
         "consent": None,
     }
     assert meta["physics"]["tilt"] == 0.0
     assert len(steps) == 2 * RATE == end["steps"]
     assert steps[-1]["n"] == 2 * RATE
-    assert set(steps[0]) >= {"asked", "sent", "terms", "clock", "delays", "pads"}
+    assert set(steps[0]) >= {"action", "command", "terms", "clock", "delays", "paddles"}
     np.testing.assert_allclose(
-        steps[-1]["pads"], court.world.state.paddle[0], atol=1e-4
+        steps[-1]["paddles"], match.world.state.paddle[0], atol=1e-4
     )
-    film(path, tmp_path / "game.gif")
+    write_recording_video(path, tmp_path / "game.gif")
     with Image.open(tmp_path / "game.gif") as video:
         assert video.n_frames == RATE
     rows = path.read_text().splitlines()
     path.write_text("\n".join([rows[0], '{"kind":"step","n":1}']))
     with pytest.raises(ValueError, match="line 2 lacks"):
         read(path)
+    path.write_text(rows[0].replace('"format":2', '"format":1'))
+    with pytest.raises(ValueError, match=f"{path.name}: recorded by an older version"):
+        read(path)
     path.write_text(rows[0])
     with pytest.raises(ValueError, match="no steps"):
-        film(path, tmp_path / "game.gif")
+        write_recording_video(path, tmp_path / "game.gif")
     path.write_bytes(b"\xff\x00")
     with pytest.raises(ValueError, match="cannot be read"):
         read(path)
@@ -345,38 +355,40 @@ def test_recordings_become_a_report(tmp_path):
     for seed in range(3):
         seats = {"paddle_0": "person", "paddle_1": "striker:strength=fair"}
         options = {"options": {"seconds": 6.0}}
-        court = Court("duel", seats, options, seed=seed)
-        session = Session(court, Recorder(tmp_path))
-        guest = session.join()
-        session.hear(guest, line("hello", key="alice"))
-        session.hear(guest, line("start"))
-        while court.phase != "done":
-            _, y = court.world.state.puck[0, 0]
-            guest.meter = Meter(time.monotonic())
-            session.hear(guest, aim(-0.6, float(y)))
+        match = LiveMatch("duel", seats, options, seed=seed)
+        session = Session(match, Recorder(tmp_path))
+        client = session.connect()
+        session.receive(client, line("hello", key="alice"))
+        session.receive(client, line("start"))
+        while match.phase != "done":
+            _, y = match.world.state.puck[0, 0]
+            client.limiter = RateLimiter(time.monotonic())
+            session.receive(client, aim(-0.6, float(y)))
             session.tick()
-    court.start()
+    match.start()
     for _ in range(4 * RATE):
         session.tick()
-    session.recorder.end(court, "a player has left")
-    found = report(tmp_path)
+    session.recorder.end(match, "a player has left")
+    found = summarize(tmp_path)
     assert found.episodes == 4
     assert found.broken_off == 1
-    person = found.players[guest.name]
+    person = found.players[client.name]
     assert person.person
     assert person.games == 3 == found.players["striker:strength=fair"].games
     assert len(found.games) == 3
     assert person.steps > 3 * 6 * RATE
-    assert found.players["striker:strength=fair"].shots
+    assert found.players["striker:strength=fair"].shot_speeds
     files = found.save(tmp_path / "out")
+    files.append(tmp_path / "out" / "report.png")
+    plot_report(found, files[-1])
     assert all(path.stat().st_size > 100 for path in files)
     data = json.loads(files[0].read_text())
     assert {row["player"] for row in data["players"]} == set(found.players)
     with pytest.raises(ValueError, match="no recordings"):
-        report(tmp_path / "out")
+        summarize(tmp_path / "out")
 
 
-def test_reactions_and_met_pucks_are_measured_right():
+def test_reactions_and_interceptions_are_measured_right():
     n, dt = 120, 1 / RATE
     place = np.zeros((n, 2))
     place[:20] = (0.8, 0.0)
@@ -385,14 +397,14 @@ def test_reactions_and_met_pucks_are_measured_right():
     motion[20:, 0] = -0.5
     speed = np.zeros(n)
     speed[20 + 15 :] = 0.5
-    assert list(_reactions(place, motion, speed, dt)) == [pytest.approx(0.25)]
+    assert list(reactions(place, motion, speed, dt)) == [pytest.approx(0.25)]
     speed[:] = 0.5
-    assert list(_reactions(place, motion, speed, dt)) == [], "who moves does not react"
+    assert list(reactions(place, motion, speed, dt)) == [], "who moves does not react"
     hits = np.zeros(n, bool)
     hits[90] = True
     motion[90:, 0] = 1.0
-    assert list(_comes(place, motion, hits)) == [True]
-    assert list(_comes(place, motion, hits & False)) == [False]
+    assert list(interceptions(place, motion, hits)) == [True]
+    assert list(interceptions(place, motion, hits & False)) == [False]
 
 
 @contextlib.contextmanager
@@ -449,7 +461,7 @@ def test_frames_are_not_held_back_for_acknowledgements():
     assert asyncio.run(option_of_a_connection())
 
 
-def test_bad_guests_do_not_disturb_a_game():
+def test_bad_clients_do_not_disturb_a_game():
     async def mischief(url):
         async with websockets.connect(url) as player:
             await player.send(line("hello", key="player"))
@@ -559,12 +571,12 @@ def test_a_person_plays_in_the_browser(browser):
             page.mouse.move(middle[0] + x * metre, middle[1] - y * metre)
 
         point(-0.5, 0.15)
-        wait(page, "Math.hypot(s.pads[0][0] + 0.5, s.pads[0][1] - 0.15) < 0.03")
+        wait(page, "Math.hypot(s.paddles[0][0] + 0.5, s.paddles[0][1] - 0.15) < 0.03")
         began = time.monotonic()
         while (state := state_of(page))["phase"] == "play":
             # Get behind the puck, then through it.
             x, y = state["pucks"][0][:2]
-            behind = state["pads"][0][0] < x - 0.06
+            behind = state["paddles"][0][0] < x - 0.06
             point(min(x, -0.06) if behind else x - 0.2, y)
             page.wait_for_timeout(16)
             assert time.monotonic() - began < 55, "no goal against nobody"
@@ -593,18 +605,18 @@ def test_a_phone_plays_upright(browser):
         box = page.locator("#table").bounding_box()
         x, y = box["x"] + box["width"] * 0.5, box["y"] + box["height"] * 0.8
         page.mouse.move(x, y)
-        wait(page, "Math.abs(s.pads[0][1]) < 0.03 && s.ack > 0")
+        wait(page, "Math.abs(s.paddles[0][1]) < 0.03 && s.ack > 0")
         page.close()
     assert not complaints
 
 
 def test_a_recording_is_watched_in_the_page(browser, tmp_path):
-    court = Court("duel", {"paddle_0": "striker", "paddle_1": "still"}, {}, seed=1)
-    session = Session(court, Recorder(tmp_path))
-    court.start()
+    match = LiveMatch("duel", {"paddle_0": "striker", "paddle_1": "still"}, {}, seed=1)
+    session = Session(match, Recorder(tmp_path))
+    match.start()
     for _ in range(8 * RATE):
         session.tick()
-    session.recorder.end(court, "enough")
+    session.recorder.end(match, "enough")
     (path,) = tmp_path.iterdir()
     complaints = []
     with running("watch", str(path)) as (address, _):

@@ -1,4 +1,4 @@
-"""Recordings: see the definitions."""
+"""Recordings of play: files of JSON lines, and how they are read."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-FORMAT = 1
+FORMAT = 2
+"""Version of the format; 1 had other names of keys, and is refused."""
 
 
-STEP = {"n", "time", "pads", "pucks", "events", "excess", "delays", "caption"}
-"""What readers need of every step."""
+STEP = {"n", "time", "paddles", "pucks", "events", "violation", "delays", "caption"}
+"""Keys that readers need of every step."""
 
 
 def head(path: Path) -> dict[str, Any]:
-    """The first line of a file of JSON lines; {} if it is none."""
+    """Return the first line of a file of JSON lines; {} if the file is none."""
     try:
         with path.open() as file:
             row = json.loads(file.readline())
@@ -24,12 +25,14 @@ def head(path: Path) -> dict[str, Any]:
 
 
 def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
-    """The meta line, the steps and the end ({} if it was cut off) of a recording.
+    """Return the meta line, the steps and the end line of a recording.
 
-    A last line that is not whole, and what follows one, is left out.
+    The end is {} if the file was cut off. The first line that is not whole JSON, and
+    all after it, is left out.
 
     Raises:
-        ValueError: no recording, or one of another format.
+        ValueError: no recording, one of another version, or an incomplete step; names
+            the file.
     """
     try:
         lines = path.read_text().splitlines()
@@ -43,8 +46,13 @@ def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, An
             break
     if not rows or not isinstance(rows[0], dict) or rows[0].get("kind") != "meta":
         raise ValueError(f"{path}: no recording of airhockey play")
-    if rows[0].get("format") != FORMAT:
-        raise ValueError(f"{path}: format {rows[0].get('format')}, expected {FORMAT}")
+    found = rows[0].get("format")
+    if found != FORMAT:
+        age = "older" if isinstance(found, int) and found < FORMAT else "other"
+        raise ValueError(
+            f"{path}: recorded by an {age} version of marl_airhockey (format {found}); "
+            f"this version reads format {FORMAT} alone"
+        )
     for number, row in enumerate(rows[1:], 2):
         if row.get("kind") == "step" and not row.keys() >= STEP:
             raise ValueError(f"{path}: line {number} lacks {sorted(STEP - row.keys())}")

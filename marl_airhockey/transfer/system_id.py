@@ -105,14 +105,16 @@ def recorded(paths: Sequence[Path]) -> Play:
     names = set()
     for path in paths:
         meta, steps, _ = read(path)
-        names.add(meta["court"]["scenario"])
-        scenario = make_scenario(meta["court"]["scenario"], **meta["options"])
-        rows = np.array([row["pads"] + [p[:2] for p in row["pucks"]] for row in steps])
+        names.add(meta["match"]["scenario"])
+        scenario = make_scenario(meta["match"]["scenario"], **meta["options"])
+        rows = np.array(
+            [row["paddles"] + [p[:2] for p in row["pucks"]] for row in steps]
+        )
         speeds = np.array(
-            [row["pad_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
+            [row["paddle_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
         )
         follows = np.arange(len(steps)) > 0
-        command = np.array([row["sent"] for row in steps])
+        command = np.array([row["command"] for row in steps])
         parts.append((rows, speeds, command, follows))
     if len(names) != 1:
         found = ", ".join(sorted(names)) or "no recordings (.jsonl files)"
