@@ -64,11 +64,7 @@ def transfer(
     folder = out or Path("runs") / f"transfer-{scenario}"
     # Everything that may be wrong is checked before anything takes time.
     backends, profiles = _list(to), _list(profile)
-    for backend in backends:
-        find_backend(backend)
-    for kind in profiles:
-        if kind not in PROFILES:
-            raise ValueError(unknown_name("profile", kind, PROFILES))
+    _check_names(backends, profiles)
     make_scenario(scenario, **settings(option))
     policies = _policies(scenario, policy or [], fine_tune, seed, folder)
     with bar() as progress:
@@ -147,6 +143,15 @@ def _table(rows: list[Transfer], title: str) -> Table:
     return table
 
 
+def _check_names(backends: list[str], profiles: list[str]) -> None:
+    """Raise an error that names an unknown backend or profile."""
+    for backend in backends:
+        find_backend(backend)
+    for profile in profiles:
+        if profile not in PROFILES:
+            raise ValueError(unknown_name("profile", profile, PROFILES))
+
+
 def _list(names: str) -> list[str]:
     """Return the names in a list with commas, each once."""
     return list(dict.fromkeys(name.strip() for name in names.split(",")))
@@ -183,11 +188,11 @@ def fit(
     if recordings is not None:
         seen = recorded(sorted(recordings.glob("*.jsonl")))
     else:
-        who = make_driver(driver or f"zoo/{scenario}")
+        player = make_driver(driver or f"zoo/{scenario}")
         there = load_physics(physics) if physics else {}
         with console.status(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}
-            seen = play(scenario, who, steps, seed, keywords)
+            seen = play(scenario, player, steps, seed, keywords)
     with console.status("fitting"):
         found = find(seen)
     out.parent.mkdir(parents=True, exist_ok=True)

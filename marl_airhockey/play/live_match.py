@@ -1,4 +1,4 @@
-"""A match that is played live: its drivers, its phases, its clock. No network here."""
+"""Live match: its drivers, its phases, its clock. No network here."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class MatchDrivers:
             ValueError: an unknown name, or a policy that does not fit.
         """
         if name in INPUT_DEVICES:
-            raise ValueError(f"{name} is what a person steers with: say {PERSON}")
+            raise ValueError(f"{name} is a person's input device: say {PERSON}")
         old_name, old = self.names[i], self._driven[i]
         self.names[i] = name
         try:

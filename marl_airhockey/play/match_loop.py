@@ -1,4 +1,4 @@
-"""The loop of a match: it ticks in real time, is recorded and sent to all pages."""
+"""Loop of a match: it ticks in real time, is recorded and sent to all pages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measures of a player, from the steps of recordings."""
+"""Measurements of a player, from the steps of recordings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Player:
     drawn: int = 0
     lost: int = 0
     interceptions: list[bool] = field(default_factory=list)
-    """Of every incoming puck: True if it was hit."""
+    """One value for each incoming puck: True if it was hit."""
     reactions: list[float] = field(default_factory=list)
     """Times from a serve to the first movement, s."""
     shot_speeds: list[float] = field(default_factory=list)

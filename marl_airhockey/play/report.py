@@ -31,7 +31,7 @@ class Report:
     """Measurements of all players, and the games between them."""
 
     players: dict[str, Player]
-    """By name."""
+    """Measurements by the player's name."""
     games: list[tuple[str, str, float]]
     """Rows (player, other player, score of the first: 1, 0.5 or 0)."""
     episodes: int

@@ -1,8 +1,8 @@
 """Archive of a study: a folder for each person, and how it is erased.
 
 A folder ``participant-007`` holds ``diary.jsonl`` (a head, then consent, games and
-answers, a line each) and the recordings of that participant's games. Whoever plays as
-an opponent has a folder ``partner-000`` with the consent alone.
+answers, a line each) and the recordings of that participant's games. A person who plays
+as an opponent has a folder ``partner-000`` with the consent alone.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Diary:
             study: its folder.
             role: "participant" or "partner".
             plan: of the study; a participant's order is that of the lowest free number,
-                so that whoever is erased leaves no gap in the counterbalancing.
+                so that an erased person leaves no gap in the counterbalancing.
             page: key of the person's page, of which a digest is kept.
         """
         number, folder = _new_folder(study, role)
@@ -158,7 +158,7 @@ def diaries(folder: Path) -> Iterator[Diary]:
             yield Diary(path.parent, rows)
 
 
-def erase(folder: Path, who: str) -> int:
+def erase(folder: Path, code: str) -> int:
     """Delete all that is kept of a person; return the number of files.
 
     The games that the person played as somebody's opponent go, too, and reports that
@@ -171,16 +171,16 @@ def erase(folder: Path, who: str) -> int:
     gone = 0
     number = None
     for diary in list(diaries(folder)):
-        if diary.code == who:
+        if diary.code == code:
             number = diary.number
             gone += sum(p.is_file() for p in diary.folder.rglob("*"))
             shutil.rmtree(diary.folder)
     for path in list(folder.rglob("*.jsonl")):
-        if who in [player["person"] for player in head(path).get("players", [])]:
+        if code in [player["person"] for player in head(path).get("players", [])]:
             path.unlink()
             gone += 1
     if not gone:
-        raise ValueError(f"{folder}: there is nothing of {who!r}")
+        raise ValueError(f"{folder}: there is nothing of {code!r}")
     for name in REPORTS:
         (folder / name).unlink(missing_ok=True)
     with (folder / "erased.jsonl").open("a") as log:

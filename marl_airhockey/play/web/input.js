@@ -28,20 +28,20 @@ function sendInput(at) {
 }
 
 let stickUsed = 0;
-const held = new Set(); // arrow keys
+const pressed = new Set(); // arrow keys
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 function stick() {
   const pad = (navigator.getGamepads ? [...navigator.getGamepads()] : []).find(Boolean);
   let x = pad ? pad.axes[0] || 0 : 0, y = pad ? -(pad.axes[1] || 0) : 0;
-  for (const code of held) { x += ARROWS[code][0]; y += ARROWS[code][1]; }
+  for (const code of pressed) { x += ARROWS[code][0]; y += ARROWS[code][1]; }
   if (Math.hypot(x, y) > 0.12) stickUsed = performance.now();
   if (!stickUsed || performance.now() - stickUsed > 2000) return null;
   // Right on the stick is right on the screen, whatever seat it is.
   const a = toTableFrame(x, y);
   return [Math.max(-1, Math.min(1, a[0])), Math.max(-1, Math.min(1, a[1]))];
 }
-addEventListener("keyup", (event) => held.delete(event.code));
-addEventListener("blur", () => held.clear());
+addEventListener("keyup", (event) => pressed.delete(event.code));
+addEventListener("blur", () => pressed.clear());
 
 // Raw updates come at once; others wait for the next picture.
 canvas.addEventListener("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", aim);
@@ -52,7 +52,7 @@ function toggle() {
 }
 addEventListener("keydown", (event) => {
   if (["SELECT", "INPUT"].includes(event.target.tagName) || event.repeat) return;
-  if (event.code in ARROWS) { event.preventDefault(); held.add(event.code); }
+  if (event.code in ARROWS) { event.preventDefault(); pressed.add(event.code); }
   if (event.code === "Space" || event.code === "Enter") { if (event.target.tagName === "BUTTON") return; event.preventDefault(); toggle(); }
   if (event.code === "KeyS" && match && !match.study) send("swap");
   if (event.code === "KeyM") $("sound").click();

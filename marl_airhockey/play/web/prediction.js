@@ -9,7 +9,7 @@ function correct(data) {
   if (!ownPaddle || data.phase !== "play" || steered) { ownPaddle = { x, y, vx: 0, vy: 0 }; predicted = []; return; }
   const past = predicted.find((p) => p[0] === data.ack);
   if (!past) return;
-  // What the server has now is what we had when we sent the aim that it has taken.
+  // The server's position belongs to the aim that it acknowledges: compare with ours of then.
   const dx = x - past[1], dy = y - past[2], share = Math.hypot(dx, dy) > 0.15 ? 1 : 0.12;
   ownPaddle.x += share * dx; ownPaddle.y += share * dy;
   for (const p of predicted) { p[1] += share * dx; p[2] += share * dy; }
