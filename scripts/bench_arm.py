@@ -1,10 +1,10 @@
-"""How fast is the arm? Control steps per CPU-second, in turns.
+"""Speed of the arm: control steps per CPU-second, cases measured in rounds.
 
     python scripts/bench_arm.py --rounds 5
 
-robosuite's own Lift with a UR5e; our environment stepped by robosuite; the same model
-in the compiled steps that `backend="robosuite"` takes, with one arm and with two. All
-at 20 Hz; Lift at robosuite's own time step of 2 ms, ours at 1 ms and at 2 ms.
+Cases: robosuite's own Lift with a UR5e; our environment stepped by robosuite; the same
+model in the compiled steps of `backend="robosuite"`; ours with one arm and with two.
+All at 20 Hz; Lift at robosuite's own time step of 2 ms, ours at 1 ms and at 2 ms.
 """
 
 from __future__ import annotations
@@ -27,17 +27,18 @@ from marl_airhockey.registry import find_backend
 from marl_airhockey.toolkit.starts import first_state
 
 Step = Callable[[], object]
+"""Function that makes one control step"""
 
 
-def scene(arms: int) -> Scene:
-    """A puck and one arm at home, or two."""
+def make_scene(arms: int) -> Scene:
+    """Return a scene of a puck and one arm, or two."""
     table = TABLES["standard"]
     seats = tuple(make_seat("robot", table, side) for side in (0, 2)[:arms])
     return Scene(table, seats, pucks=1)
 
 
 def lift() -> Step:
-    """The Lift that comes with robosuite."""
+    """Return the step of robosuite's Lift."""
     import robosuite
 
     env = robosuite.make(
@@ -57,20 +58,20 @@ def lift() -> Step:
 
 
 def stepped_by_robosuite(arms: int, timestep: float) -> Step:
-    """Our environment, its own steps."""
+    """Return the step of our environment as robosuite makes it."""
     from marl_airhockey.backends.robosuite.env import AirHockey
 
-    env: Any = AirHockey(scene=scene(arms), timestep=timestep)
+    env: Any = AirHockey(scene=make_scene(arms), timestep=timestep)
     env.reset()
     rng = np.random.default_rng(0)
     return lambda: env.step(rng.uniform(-1, 1, env.action_dim))
 
 
-def lean(arms: int, timestep: float) -> Step:
-    """The backend's steps; limits are the world's and not part of it."""
-    who = scene(arms)
-    backend = find_backend("robosuite")(who, 1, 0.05, round(0.05 / timestep))
-    state = first_state(who, 1)
+def compiled(arms: int, timestep: float) -> Step:
+    """Return the backend's compiled step, without the limits of the world."""
+    scene = make_scene(arms)
+    backend = find_backend("robosuite")(scene, 1, 0.05, round(0.05 / timestep))
+    state = first_state(scene, 1)
     for i, hand in enumerate(backend.env.hands):  # type: ignore[attr-defined]
         state.position[0, i] = hand.home
     backend.start(state, np.arange(1))
@@ -78,25 +79,27 @@ def lean(arms: int, timestep: float) -> Step:
 
     def step() -> object:
         phase[0] += 0.3
-        way = [np.cos(phase[0]), np.sin(phase[0])]
-        return backend.step(Command(np.full((1, arms, 2), 0.2) * way))
+        direction = [np.cos(phase[0]), np.sin(phase[0])]
+        return backend.step(Command(np.full((1, arms, 2), 0.2) * direction))
 
     return step
 
 
 def main(
-    rounds: Annotated[int, typer.Option(help="Turns.")] = 5,
-    seconds: Annotated[float, typer.Option(help="CPU-seconds of a turn.")] = 2.0,
+    rounds: Annotated[int, typer.Option(help="Rounds.")] = 5,
+    seconds: Annotated[
+        float, typer.Option(help="CPU-seconds of a case in a round.")
+    ] = 2.0,
 ) -> None:
-    """Measure and print."""
+    """Measure all cases and print a table."""
     log = logging.getLogger("robosuite_logs")
     log.addFilter(lambda record: record.levelno >= logging.ERROR)
     cases: dict[str, Step] = {"Lift, UR5e, 2 ms": lift()}
     for arms in (1, 2):
         for timestep in (0.002, 0.001):
-            what = f"{arms} arm{'s' * (arms > 1)}, {1000 * timestep:.0f} ms"
-            cases[f"robosuite's steps, {what}"] = stepped_by_robosuite(arms, timestep)
-            cases[f"backend, {what}"] = lean(arms, timestep)
+            label = f"{arms} arm{'s' * (arms > 1)}, {1000 * timestep:.0f} ms"
+            cases[f"robosuite's steps, {label}"] = stepped_by_robosuite(arms, timestep)
+            cases[f"backend, {label}"] = compiled(arms, timestep)
     rates: dict[str, list[float]] = {name: [] for name in cases}
     for step in cases.values():
         step()
@@ -108,7 +111,7 @@ def main(
                 count += 1
             rates[name].append(count / (time.process_time() - began))
     first = np.median(rates["Lift, UR5e, 2 ms"])
-    table = Table("case", title=f"{rounds} turns of {seconds} CPU-s")
+    table = Table("case", title=f"{rounds} rounds of {seconds} CPU-s")
     for name in ("control steps per CPU-s", "spread", "of Lift"):
         table.add_column(name, justify="right")
     for name, found in rates.items():

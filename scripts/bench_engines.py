@@ -1,11 +1,11 @@
-"""Training throughput of the engines, in turns in one run.
+"""Training throughput of the engines, measured in rounds.
 
     python scripts/bench_engines.py --rounds 3
 
 Needs an environment with Ray: `make test-distributed` sets one up, and
 `.venv-distributed/bin/python` is its interpreter. A row is one trainer after its
 first iteration: steps of single seats per second of wall time and per CPU-second of
-all its processes, mean and range over the turns.
+all its processes, mean and range over the rounds.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.rllib import algorithm, start_ray
+from marl_airhockey.learn.rllib import build_algorithm, start_ray
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU
-from marl_airhockey.learn.sb3 import build
-from marl_airhockey.learn.sb3_callback import Rate
-from marl_airhockey.learn.self_play import environment
+from marl_airhockey.learn.sb3 import build_model
+from marl_airhockey.learn.sb3_callback import AdaptiveRate
+from marl_airhockey.learn.self_play import make_training_env
 
 
-class Turn(NamedTuple):
-    """An iteration of training."""
+class Iteration(NamedTuple):
+    """Steps and time, s, of an iteration of training."""
 
     steps: int
     wall: float
     cpu: float
 
 
-def timed(work: Callable[[], tuple[int, float]]) -> Turn:
-    """Run work that tells its steps and the CPU time of other processes."""
+def timed(work: Callable[[], tuple[int, float]]) -> Iteration:
+    """Time a function that returns its steps and the CPU time of other processes."""
     wall, cpu = time.perf_counter(), time.process_time()
     steps, elsewhere = work()
     spent = time.process_time() - cpu + elsewhere
-    return Turn(steps, time.perf_counter() - wall, spent)
+    return Iteration(steps, time.perf_counter() - wall, spent)
 
 
-def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Turn]:
-    """Turns of the engine "sb3"."""
+def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Iteration]:
+    """Return a function that runs an iteration of the engine "sb3"."""
     config = preset(scenario, {"num_worlds": worlds})
-    env = environment(config, worlds, folder)
-    model = build(config, env, Rate(config, config.learning_rate))
+    env = make_training_env(config, worlds, folder)
+    model = build_model(config, env, AdaptiveRate(config, config.learning_rate))
     model.set_logger(Logger(None, []))
     steps = config.n_steps * config.slots
 
@@ -63,10 +63,12 @@ def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Turn]:
     return lambda: timed(work)
 
 
-def rllib(scenario: str, worlds: int, folder: Path, runners: int) -> Callable[[], Turn]:
-    """Turns of the engine "rllib"."""
+def rllib(
+    scenario: str, worlds: int, folder: Path, runners: int
+) -> Callable[[], Iteration]:
+    """Return a function that runs an iteration of the engine "rllib"."""
     changes = {"engine": "rllib", "num_env_runners": runners, "num_worlds": worlds}
-    algo = algorithm(preset(scenario, changes), folder)
+    algo = build_algorithm(preset(scenario, changes), folder)
 
     def work() -> tuple[int, float]:
         found = algo.train()["env_runners"]
@@ -77,12 +79,12 @@ def rllib(scenario: str, worlds: int, folder: Path, runners: int) -> Callable[[]
 
 
 def main(
-    scenario: Annotated[str, typer.Option(help="What is trained.")] = "duel",
+    scenario: Annotated[str, typer.Option(help="Scenario to train.")] = "duel",
     worlds: Annotated[int, typer.Option(help="Worlds of each trainer.")] = 1024,
-    rounds: Annotated[int, typer.Option(help="Turns of each.")] = 3,
+    rounds: Annotated[int, typer.Option(help="Rounds.")] = 3,
     runners: Annotated[int, typer.Option(help="Most env runners.")] = 2,
 ) -> None:
-    """Measure and print."""
+    """Measure all trainers and print a table."""
     torch.set_num_threads(1)
     start_ray(2 * runners + 1)
     folder = Path(tempfile.mkdtemp())
@@ -90,15 +92,15 @@ def main(
     for n in range(runners + 1):
         name = f"rllib, {n} env runners"
         trainers[name] = rllib(scenario, worlds, folder / str(n), n)
-    turns: dict[str, list[Turn]] = {name: [] for name in trainers}
+    measured: dict[str, list[Iteration]] = {name: [] for name in trainers}
     for i in range(rounds + 1):
-        for name, turn in trainers.items():
-            found = turn()
+        for name, train in trainers.items():
+            iteration = train()
             if i:
-                turns[name].append(found)
+                measured[name].append(iteration)
     table = Table("trainer", "steps per s", "range", "steps per CPU-s", "of sb3")
-    base = np.mean([t.steps / t.cpu for t in turns["sb3"]])
-    for name, rows in turns.items():
+    base = np.mean([t.steps / t.cpu for t in measured["sb3"]])
+    for name, rows in measured.items():
         wall = [t.steps / t.wall for t in rows]
         cpu = float(np.mean([t.steps / t.cpu for t in rows]))
         table.add_row(

@@ -1,10 +1,10 @@
-"""How the cost of a step of the batched backend grows, as a table and a picture.
+"""Growth of the cost of a step of the numba backend, as a table and a picture.
 
     python scripts/bench_scaling.py --out docs/images/scaling.png
 
-Whole env-steps of `juggle` against the number of worlds, restarts included; physics
-alone, in 1024 worlds that are put back every 20 steps, against pucks, blocks and
-paddles. CPU time of this process; all cases take turns, medians over the rounds.
+Whole env-steps of `juggle` against the number of worlds, resets included; physics
+alone, in 1024 worlds that are reset every 20 steps, against pucks, blocks and paddles.
+CPU time of this process; each case is measured once a round, medians over the rounds.
 """
 
 from __future__ import annotations
@@ -30,44 +30,44 @@ from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.registry import find_backend
 from marl_airhockey.toolkit.starts import first_state
 
-Play = Callable[[], tuple[float, int]]
-"""Steps for a moment: CPU-seconds and calls."""
+Steps = Callable[[], tuple[float, int]]
+"""Function that steps for a moment and returns CPU-seconds and calls"""
 WORLDS = (1, 4, 16, 64, 256, 1024, 4096, 16384, 65536)
-BATCH, LAPSE, SIGN = 1024, 20, 4
-"""Worlds of physics alone; steps between two starts, and until paddles turn back."""
+BATCH, EPISODE, REVERSAL = 1024, 20, 4
+"""Worlds of physics alone; steps between two resets; steps until paddles reverse"""
 ROWS = np.linspace(-0.3, 0.3, 4)
 PADDLES = [(x, y) for x in (-0.8, -0.6) for y in ROWS]
 PUCKS = [(x, y) for x in (-0.35, -0.2) for y in ROWS[[1, 2, 0, 3]]]
 BLOCKS = [(x, y) for x in np.linspace(0, 0.8, 6) for y in np.linspace(-0.25, 0.25, 5)]
-"""m: where bodies start, apart from each other; the first so many are used."""
+"""First positions of bodies, m, apart from each other; the first so many are used"""
 AIM = np.pi / 6
-"""rad: up to so far from straight at the blocks."""
+"""Largest angle between a puck's velocity and the direction of the blocks, rad"""
 
 
-def whole(worlds: int) -> Play:
-    """Env-steps of `juggle`: physics, rules, observations and restarts."""
+def env_steps(worlds: int) -> Steps:
+    """Return env-steps of `juggle`: physics, rules, observations and resets."""
     world = ah.make_world("juggle", worlds, backend="numba")
     world.reset(0)
-    drawn = np.random.default_rng(0).uniform(-1, 1, (16, worlds, 1, 2))
-    for k in range(100):  # compiles, and lets episodes fall out of step
-        world.step(drawn[k % 16])
+    actions = np.random.default_rng(0).uniform(-1, 1, (16, worlds, 1, 2))
+    for k in range(100):  # compiles, and lets episodes spread apart
+        world.step(actions[k % 16])
     calls = max(16, 4096 // worlds)
 
-    def play() -> tuple[float, int]:
+    def step() -> tuple[float, int]:
         began = time.process_time()
         for k in range(calls):
-            world.step(drawn[k % 16])
+            world.step(actions[k % 16])
         return time.process_time() - began, calls
 
-    return play
+    return step
 
 
 def physics(
     paddles: int, pucks: int, blocks: int = 0, spread: float = np.pi, top: float = 1.0
-) -> Play:
-    """Physics alone on the full-size table.
+) -> Steps:
+    """Return steps of physics alone on the full-size table.
 
-    Pucks fly at about ``top`` m/s, up to ``spread`` rad from straight at the blocks.
+    Pucks move at about ``top`` m/s, up to ``spread`` rad off the blocks' direction.
     """
     table = TABLES["full_size"]
     seats = (make_seat("arcade", table, side=0),) * paddles
@@ -81,33 +81,33 @@ def physics(
     state.position[:] = PADDLES[:paddles] + PUCKS[:pucks] + BLOCKS[:blocks]
     angle = rng.uniform(-spread, spread, (BATCH, pucks))
     speed = top * rng.uniform(0.8, 1.2, (BATCH, pucks, 1))
-    way = np.stack([np.cos(angle), np.sin(angle)], -1)
-    state.velocity[:, paddles : paddles + pucks] = speed * way
-    there = 0.5 * top * rng.uniform(-1, 1, (BATCH, paddles, 2))
-    orders = Command(there), Command(-there)
+    direction = np.stack([np.cos(angle), np.sin(angle)], -1)
+    state.velocity[:, paddles : paddles + pucks] = speed * direction
+    forth = 0.5 * top * rng.uniform(-1, 1, (BATCH, paddles, 2))
+    commands = Command(forth), Command(-forth)
 
-    def play() -> tuple[float, int]:
+    def step() -> tuple[float, int]:
         backend.start(state, everywhere)
         began = time.process_time()
-        for k in range(LAPSE):
-            backend.step(orders[k // SIGN % 2])
-        return time.process_time() - began, LAPSE
+        for k in range(EPISODE):
+            backend.step(commands[k // REVERSAL % 2])
+        return time.process_time() - began, EPISODE
 
-    play()
-    return play
+    step()
+    return step
 
 
-def clocked(play: Play, seconds: float) -> float:
-    """CPU-seconds of a call, over a turn of so many; never without a call."""
-    spent, calls = play()
+def seconds_per_call(step: Steps, seconds: float) -> float:
+    """Return the CPU-seconds of a call, measured for so many, one call at least."""
+    spent, calls = step()
     while spent < seconds:
-        more, steps = play()
-        spent, calls = spent + more, calls + steps
+        more, further = step()
+        spent, calls = spent + more, calls + further
     return spent / calls
 
 
-def draw(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
-    """A panel for each thing that grows; ``costs`` in ns per step of a world."""
+def plot_costs(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
+    """Draw a panel for each number that grows; ``costs`` in ns per step of a world."""
     figure, grid = plt.subplots(2, 2, figsize=(8.4, 6.2), dpi=DPI, layout="constrained")
     panels = dict.fromkeys(name for name, _ in costs)
     for axes, panel in zip(grid.flat, panels, strict=True):
@@ -137,25 +137,25 @@ def draw(costs: dict[tuple[str, str], dict[int, float]], out: Path) -> None:
 
 
 def main(
-    rounds: Annotated[int, typer.Option(min=1, help="Turns of every case.")] = 7,
+    rounds: Annotated[int, typer.Option(min=1, help="Rounds.")] = 7,
     seconds: Annotated[float, typer.Option(help="CPU-seconds per point.")] = 1.0,
     out: Annotated[Path, typer.Option(help="The picture.")] = Path(
         "docs/images/scaling.png"
     ),
 ) -> None:
-    """Measure all cases in turns, print and draw them."""
+    """Measure all cases in rounds, print and draw them."""
     some, many = range(1, 9), range(0, 31, 5)
-    cases: dict[tuple[str, str], dict[int, Play]] = {
-        ("worlds", "1 paddle, 1 puck"): {n: whole(n) for n in WORLDS},
+    cases: dict[tuple[str, str], dict[int, Steps]] = {
+        ("worlds", "1 paddle, 1 puck"): {n: env_steps(n) for n in WORLDS},
         ("pucks", "1 paddle, n pucks"): {n: physics(1, n) for n in some},
         ("blocks", "puck flies at them"): {n: physics(1, 1, n, AIM) for n in many},
         ("blocks", "all at rest"): {n: physics(1, 1, n, top=0.0) for n in many},
         ("paddles", "n paddles, 1 puck"): {n: physics(n, 1) for n in some},
     }
     found = {(key, n): np.zeros(rounds) for key in cases for n in cases[key]}
-    for turn in range(rounds):
+    for round_ in range(rounds):
         for key, n in found:
-            found[key, n][turn] = clocked(cases[key][n], seconds / rounds)
+            found[key, n][round_] = seconds_per_call(cases[key][n], seconds / rounds)
     table = Table("against", "case", "number", "us per call", "ns per world-step")
     costs: dict[tuple[str, str], dict[int, float]] = {key: {} for key in cases}
     for (key, n), times in found.items():
@@ -163,7 +163,7 @@ def main(
         costs[key][n] = call / worlds * 1e9
         table.add_row(*key, f"{n}", f"{call * 1e6:,.1f}", f"{costs[key][n]:,.0f}")
     Console().print(table)
-    draw(costs, out)
+    plot_costs(costs, out)
 
 
 if __name__ == "__main__":

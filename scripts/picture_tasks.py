@@ -1,4 +1,4 @@
-"""Draw every scenario a moment into a scripted episode, as two pictures for the docs.
+"""Pictures for the docs: every scenario a moment into a scripted episode.
 
 python scripts/picture_tasks.py --out docs/images
 """
@@ -13,18 +13,19 @@ import numpy as np
 import typer
 
 import marl_airhockey as ah
-from marl_airhockey.render.renderer import Renderer, draw
+from marl_airhockey.render.picture import draw
+from marl_airhockey.render.renderer import Renderer
 from marl_airhockey.types import Array
 
 COLUMNS = 2
 MOMENT = 1.9
-"""s into the episode, or its last moment."""
+"""Time of the picture, s, unless the episode ends before"""
 WIDE = 1.5
-"""Tables that are less long for their width are drawn smaller."""
+"""Ratio of length to width below which tables are drawn smaller"""
 
 
 def moment(name: str, width: int) -> Array:
-    """A picture of a scenario with scripts in all seats."""
+    """Return a picture of a scenario with scripted drivers at all seats."""
     seats = ah.make_scenario(name).scene.seats
     driver = "allround" if len(seats) > 1 else "striker"
     driver = "reacher" if name.startswith("reach") else driver
@@ -43,7 +44,7 @@ def moment(name: str, width: int) -> Array:
 
 
 def sheet(pictures: list[Array], width: int) -> Array:
-    """Pictures in rows, on white."""
+    """Return one picture of many in rows, on white."""
     rows = []
     for i in range(0, len(pictures), COLUMNS):
         some = pictures[i : i + COLUMNS]
@@ -61,7 +62,7 @@ def main(
     ),
     width: Annotated[int, typer.Option(help="Pixels of one scene.")] = 560,
 ) -> None:
-    """Play, draw, paste."""
+    """Play all scenarios, draw and save two sheets."""
     out.mkdir(parents=True, exist_ok=True)
     kinds: dict[str, list[Array]] = {"tasks": [], "games": []}
     for name in ah.scenario_names():

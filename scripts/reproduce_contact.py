@@ -1,10 +1,10 @@
-"""Does the arm keep its paddle on the table? Statistics over every physics step.
+"""Contact of the arm's paddle with the table: statistics over every physics step.
 
     python scripts/reproduce_contact.py --steps 2000 --seeds 5
 
-Random actions, full-speed runs in random directions, the zoo's juggling policy, and
-the zoo's duel between two arms, for some seeds and control steps in the robot profile's
-spread of physics. Height and tilt are extremes, the force is a mean.
+Cases: random actions, full speed in random directions, the zoo's juggling policy, and
+the zoo's duel between two arms, for some seeds and control steps with the robot
+profile's range of physics. Height and tilt are extremes, the force is a mean.
 """
 
 from __future__ import annotations
@@ -22,37 +22,38 @@ from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.types import Array
 from marl_airhockey.world.world import World
 
-LIMIT = 0.9 * np.pi
-"""rad/s, of a joint"""
-Rule = Callable[[int, World], Array]
+JOINT_LIMIT = 0.9 * np.pi
+"""Limit of a joint's speed, rad/s"""
+ActionRule = Callable[[int, World], Array]
+"""Function of step number and world that returns actions (B, open seats, 2)"""
 
 
-def unsteady(seed: int) -> Rule:
-    """Another action at every step."""
+def unsteady(seed: int) -> ActionRule:
+    """Return a rule that draws an action at every step."""
     rng = np.random.default_rng(seed)
     return lambda k, world: rng.uniform(-1, 1, (world.num_worlds, len(world.open), 2))
 
 
-def sweeping(seed: int) -> Rule:
-    """Full speed one way for 0.6 s, then another."""
+def sweeping(seed: int) -> ActionRule:
+    """Return a rule of full speed in one direction for 0.6 s, then in another."""
     rng = np.random.default_rng(seed)
     held: dict[str, Array] = {}
 
-    def ask(k: int, world: World) -> Array:
+    def actions(k: int, world: World) -> Array:
         if k % 12 == 0:
             angle = rng.uniform(0, 2 * np.pi, (world.num_worlds, len(world.open)))
             held["now"] = np.stack([np.cos(angle), np.sin(angle)], -1)
         return held["now"]
 
-    return ask
+    return actions
 
 
-def nobody(seed: int) -> Rule:
-    """Drivers play."""
+def nobody(seed: int) -> ActionRule:
+    """Return a rule of no actions: drivers have all seats."""
     return lambda k, world: np.zeros((world.num_worlds, len(world.open), 2))
 
 
-CASES: tuple[tuple[str, str, dict[str, Any], Callable[[int], Rule]], ...] = (
+CASES: tuple[tuple[str, str, dict[str, Any], Callable[[int], ActionRule]], ...] = (
     ("random", "juggle", {}, unsteady),
     ("full speed", "juggle", {}, sweeping),
     ("zoo/juggle", "juggle", {"drivers": {"paddle_0": "zoo/juggle"}}, nobody),
@@ -73,7 +74,7 @@ def main(
     seeds: Annotated[int, typer.Option(help="How many.")] = 5,
     profile: Annotated[str, typer.Option(help="ideal or robot.")] = "robot",
 ) -> None:
-    """Measure and print."""
+    """Measure all cases and print a table."""
     table = Table(title=f"{seeds} seeds of {steps} control steps, {profile} profile")
     for name in (
         "case",
@@ -91,9 +92,9 @@ def main(
         )
         world.reset(0)
         reach = ReachPlanes.of(world.scene.table, world.scene.seats)
-        ask, trace, beyond = rule(0), [], 0.0
+        actions, trace, beyond = rule(0), [], 0.0
         for k in range(steps):
-            world.step(ask(k, world))
+            world.step(actions(k, world))
             rows: Array = world.backend.trace  # type: ignore[attr-defined]
             trace.append([rows[..., 0].min(), rows[..., 0].max()])
             trace[-1] += [rows[..., 1].max(), rows[..., 2].mean(), rows[..., 3].max()]
@@ -106,7 +107,7 @@ def main(
             f"{1000 * found[:, 1].max():.2f}",
             f"{np.degrees(found[:, 2].max()):.2f}",
             f"{found[:, 3].mean():.1f}",
-            f"{found[:, 4].max():.2f} ({found[:, 4].max() / LIMIT:.0%})",
+            f"{found[:, 4].max():.2f} ({found[:, 4].max() / JOINT_LIMIT:.0%})",
             f"{1000 * beyond:.1f}",
         )
         world.close()

@@ -1,11 +1,11 @@
-"""Train the games with their presets, print what the policies are worth, draw curves.
+"""Train the games with their presets, print scores of the policies, draw curves.
 
     python scripts/reproduce_games.py --seeds 3 --jobs 2 --out runs/games
 
 A run that is there already is not trained again. A score is the share of whole games
 won, a draw counting half (in free_for_all, of four players, a quarter), with 95 %
-intervals; both ends in turns. Cooperative games: the mean return of an episode, of
-pairs from one seed, of pairs put together from two seeds, and of a scripted pair.
+intervals; ends alternate. Cooperative games: the mean return of an episode, of pairs
+from one seed, of pairs put together from two seeds, and of a scripted pair.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from rich.console import Console
 from rich.table import Table
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, curve, save, tidy
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, plot_iqm, save, tidy
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import bootstrap, interval
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
@@ -33,41 +33,42 @@ from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
-TOGETHER = ("rally", "team_juggle")
+COOPERATIVE = ("rally", "team_juggle")
 SEEN = ("random", "striker", "allround", "allround:strength=fair")
 UNSEEN = ("goalkeeper", "striker:strength=fair", "allround:strength=weak")
-BATCHED: Keywords = {"backend": "numba"}
+"""Opponents that are in the presets' training, and others"""
+ON_NUMBA: Keywords = {"backend": "numba"}
 GAMES, SEED = 400, 5_000_000
 
 
-def run(game: str, seed: int, folder: Path) -> None:
-    """Train one seed, or go on with it."""
+def train_seed(game: str, seed: int, folder: Path) -> None:
+    """Train one seed, or resume its training."""
     begun = (folder / "config.toml").exists()
     train(None if begun else preset(game, {"seed": seed}), folder)
 
 
-def milestone(folder: Path, share: float) -> Path:
-    """The snapshot of a run at a share of its training."""
-    past = sorted((folder / "milestones").glob("*.npz"))
-    return past[round(share * len(past)) - 1]
+def checkpoint(folder: Path, share: float) -> Path:
+    """Return the checkpoint of a run at a share of its training."""
+    paths = sorted((folder / "checkpoints").glob("*.npz"))
+    return paths[round(share * len(paths)) - 1]
 
 
 def cpu_minutes(folder: Path) -> float:
-    """What a run took."""
+    """Return the CPU-minutes of a run's training."""
     with (folder / "evaluations.csv").open() as file:
         return float(list(csv.DictReader(file))[-1]["cpu_seconds"]) / 60
 
 
-def versus(game: str, folders: Sequence[Path]) -> Table:
-    """Scores of each seed against scripts and against its own past."""
+def competitive_table(game: str, folders: Sequence[Path]) -> Table:
+    """Return scores of each seed against scripts and against its own checkpoint."""
     names = [*SEEN, *UNSEEN, "itself at 1/10"]
     table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
     columns = []
     for folder in folders:
         rivals: list[Driver] = [make_driver(name) for name in (*SEEN, *UNSEEN)]
-        rivals.append(load_policy(milestone(folder, 0.1)))
+        rivals.append(load_policy(checkpoint(folder, 0.1)))
         policy = load_policy(folder / "last.zip")
-        score, _ = challenge(game, policy, rivals, GAMES, SEED, BATCHED)
+        score, _ = play_against(game, policy, rivals, GAMES, SEED, ON_NUMBA)
         columns.append(score)
     for i, name in enumerate(names):
         cells = []
@@ -80,14 +81,14 @@ def versus(game: str, folders: Sequence[Path]) -> Table:
     return table
 
 
-def together(game: str, folders: Sequence[Path]) -> Table:
-    """Returns and success of pairs."""
+def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
+    """Return returns and success of pairs."""
     table = Table("pair", "return (95 %)", "success")
 
     def add(name: str, pairs: Sequence[tuple[Driver, Driver]]) -> None:
         found = [
             evaluate(
-                a, name, game, GAMES, SEED, {**BATCHED, "drivers": {"paddle_1": b}}
+                a, name, game, GAMES, SEED, {**ON_NUMBA, "drivers": {"paddle_1": b}}
             )
             for a, b in pairs
         ]
@@ -108,8 +109,8 @@ def together(game: str, folders: Sequence[Path]) -> Table:
     return table
 
 
-def curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Scores against rivals over the CPU time of training; see `charts.curve`."""
+def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
+    """Draw scores against rivals over CPU-minutes of training, by `charts.plot_iqm`."""
     runs = []
     for folder in folders:
         with (folder / "evaluations.csv").open() as file:
@@ -120,7 +121,7 @@ def curves(game: str, folders: Sequence[Path], path: Path) -> None:
     cpu = np.mean([[float(r["cpu_seconds"]) for r in x[:length]] for x in runs], 0) / 60
     for name, ink in zip(names, (*INKS, INK), strict=False):
         share = np.array([[float(r[name]) for r in x[:length]] for x in runs])
-        curve(axes, cpu, share, ink, name.partition("/")[2])
+        plot_iqm(axes, cpu, share, ink, name.partition("/")[2])
     axes.set(
         xlabel="CPU-minutes of training",
         ylabel="score: win + draw / 2",
@@ -137,14 +138,14 @@ def main(
     jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/games"),
 ) -> None:
-    """Train, judge, print, draw."""
+    """Train all games, measure the policies, print tables, draw curves."""
     console, names = Console(), games.split(",")
     folders = {
         name: [out / f"{name}-{seed}" for seed in range(seeds)] for name in names
     }
     with ProcessPoolExecutor(jobs) as pool:
         waiting = [
-            pool.submit(run, name, seed, folder)
+            pool.submit(train_seed, name, seed, folder)
             for name, rows in folders.items()
             for seed, folder in enumerate(rows)
         ]
@@ -152,11 +153,11 @@ def main(
             done.result()
     for name, rows in folders.items():
         console.rule(name)
-        if name in TOGETHER:
-            console.print(together(name, rows))
+        if name in COOPERATIVE:
+            console.print(cooperative_table(name, rows))
             continue
-        console.print(versus(name, rows))
-        curves(name, rows, out / f"{name}.png")
+        console.print(competitive_table(name, rows))
+        plot_curves(name, rows, out / f"{name}.png")
 
 
 if __name__ == "__main__":

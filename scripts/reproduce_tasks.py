@@ -5,7 +5,7 @@
 
 A run that is there already is not trained again, so the script can be stopped and
 started. Success is that of the last policy (no checkpoint is picked) over the test
-seeds, which training never sees: on the batched backend that it was trained on, on
+seeds, which training never sees: on the numba backend that it was trained on, on
 pymunk, and with one control step of action delay that it was not trained with. The
 paper's column is the row of Table I for RL in its 2D simulator (arXiv 2405.03113),
 under the paper's own rules and physics.
@@ -28,7 +28,7 @@ from marl_airhockey import make_agent
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.plots import seed_curves
+from marl_airhockey.learn.plots import plot_seed_curves
 from marl_airhockey.learn.train import train
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
@@ -45,29 +45,37 @@ PAPER = {
     "hit_goal": 0.9,
     "hit_goal_velocity": 0.0,
 }
+"""Success of RL in the paper, by task"""
 EPISODES = 2000
-BARS = (0.5, 0.9, 0.95)
+"""Episodes by which a policy is measured"""
+THRESHOLDS = (0.5, 0.9, 0.95)
+"""Levels of success to which the CPU time is reported"""
+HEADERS = (
+    *("task", "success", "worst seed", "95 % interval", "sampled", "first shot"),
+    *("on pymunk", "delayed", "CPU-min", "M steps", "CPU-s to .5 / .9 / .95"),
+    *("still", "random", "sticky", "paper's RL"),
+)
 
 
-def run(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
-    """Train one seed and judge its last policy."""
+def train_seed(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
+    """Train one seed and measure its last policy; return the row of results."""
     result = folder / "result.json"
     if result.exists():
         return dict(json.loads(result.read_text()))
     config = preset(scenario, {"seed": seed, "profile": profile})
     train(None if (folder / "config.toml").exists() else config, folder)
-    here: Keywords = {"profile": profile, "backend": "numba"}
-    there: Keywords = {"profile": profile, "backend": "pymunk"}
-    late: Keywords = {**here, "physics": {"action_delay": 0.05}}
+    numba: Keywords = {"profile": profile, "backend": "numba"}
+    pymunk: Keywords = {"profile": profile, "backend": "pymunk"}
+    delayed: Keywords = {**numba, "physics": {"action_delay": 0.05}}
     cases = {
-        "success": (True, here),
-        "sampled": (False, here),
-        "pymunk": (True, there),
-        "delayed": (True, late),
+        "success": (True, numba),
+        "sampled": (False, numba),
+        "pymunk": (True, pymunk),
+        "delayed": (True, delayed),
     }
     if scenario == "juggle":
         for hits in (10, 20):
-            cases[f"{hits} hits"] = (True, {**here, "options": {"hits": hits}})
+            cases[f"{hits} hits"] = (True, {**numba, "options": {"hits": hits}})
     row: dict[str, Any] = {"scenario": scenario, "profile": profile, "seed": seed}
     for name, (mean, keywords) in cases.items():
         policy = load_policy(folder / "last.zip", deterministic=mean)
@@ -79,21 +87,21 @@ def run(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
     curve = evaluations(folder)
     row["cpu_minutes"] = float(curve[-1]["cpu_seconds"]) / 60
     row["steps"] = int(curve[-1]["steps"])
-    for bar in BARS:
-        times = [float(c["cpu_seconds"]) for c in curve if float(c["success"]) >= bar]
-        row[f"cpu_seconds_to_{bar}"] = times[0] if times else None
+    for level in THRESHOLDS:
+        times = [float(c["cpu_seconds"]) for c in curve if float(c["success"]) >= level]
+        row[f"cpu_seconds_to_{level}"] = times[0] if times else None
     result.write_text(json.dumps(row, indent=1))
     return row
 
 
 def evaluations(folder: Path) -> list[dict[str, str]]:
-    """The rows of a run's evaluations."""
+    """Return the rows of a run's ``evaluations.csv``."""
     with (folder / "evaluations.csv").open() as file:
         return list(csv.DictReader(file))
 
 
 def floors(scenario: str, profile: str) -> dict[str, float]:
-    """Success of the drivers that know nothing."""
+    """Return the success of drivers without skill, by name."""
     keywords: Keywords = {"profile": profile, "backend": "numba"}
     return {
         name: evaluate(make_agent(name), name, scenario, EPISODES, 0, keywords).success
@@ -111,28 +119,27 @@ def main(
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/tasks"),
     markdown: Annotated[Path | None, typer.Option(help="Write the table here.")] = None,
 ) -> None:
-    """Train, judge, print."""
+    """Train all tasks, measure the policies, print a table, draw curves."""
     names = tasks.split(",")
-    wanted = [(name, seed) for seed in range(seeds) for name in names]
     console = Console()
+    folders = {
+        (name, seed): out / f"{name}-{profile}-{seed}"
+        for seed in range(seeds)
+        for name in names
+    }
     rows: list[dict[str, Any]] = []
     with ProcessPoolExecutor(jobs) as pool:
-        waiting = [
-            pool.submit(run, name, profile, seed, out / f"{name}-{profile}-{seed}")
-            for name, seed in wanted
+        futures = [
+            pool.submit(train_seed, name, profile, seed, folder)
+            for (name, seed), folder in folders.items()
         ]
-        for future in as_completed(waiting):
+        for future in as_completed(futures):
             rows.append(future.result())
             console.print_json(json.dumps(rows[-1]))
-    heads = (
-        *("task", "success", "worst seed", "95 % interval", "sampled", "first shot"),
-        *("on pymunk", "delayed", "CPU-min", "M steps", "CPU-s to .5 / .9 / .95"),
-        *("still", "random", "sticky", "paper's RL"),
-    )
     by_task = {name: [row for row in rows if row["scenario"] == name] for name in names}
     lines = [line(name, found, profile) for name, found in by_task.items()]
     table = Table(
-        *heads, title=f"{profile} profile, {seeds} seeds, {EPISODES} episodes"
+        *HEADERS, title=f"{profile} profile, {seeds} seeds, {EPISODES} episodes"
     )
     for cells in lines:
         table.add_row(*cells)
@@ -141,30 +148,30 @@ def main(
         more = {k: v for k, v in row.items() if str(k).endswith(" hits")}
         console.print("juggle, seed", row["seed"], more)
     curves = {
-        name: [evaluations(out / f"{name}-{profile}-{seed}") for seed in range(seeds)]
+        name: [evaluations(folders[name, seed]) for seed in range(seeds)]
         for name in names
     }
     picture = out / f"curves_{profile}.png"
-    seed_curves(curves, picture)
+    plot_seed_curves(curves, picture)
     console.print("learning curves:", picture)
     if markdown is not None:
-        ruled = [heads, ("---",) * len(heads), *lines]
+        ruled = [HEADERS, ("---",) * len(HEADERS), *lines]
         text = "".join(f"| {' | '.join(cells)} |\n" for cells in ruled)
         markdown.write_text(text)
 
 
 def line(name: str, rows: list[dict[str, Any]], profile: str) -> tuple[str, ...]:
-    """The cells of a task: means over its seeds, and the floors."""
+    """Return the cells of a task: means over its seeds, and the floors."""
 
     def mean(key: str) -> float:
         return float(np.mean([row[key] for row in rows]))
 
-    def reached(bar: float) -> str:
-        times = [row[f"cpu_seconds_to_{bar}"] for row in rows]
+    def seconds_to(level: float) -> str:
+        times = [row[f"cpu_seconds_to_{level}"] for row in rows]
         return "-" if None in times else f"{np.mean(times):.0f}"
 
     low, high = interval(mean("success"), EPISODES * len(rows))
-    ground = floors(name, profile)
+    floor = floors(name, profile)
     return (
         name,
         f"{mean('success'):.3f}",
@@ -176,8 +183,8 @@ def line(name: str, rows: list[dict[str, Any]], profile: str) -> tuple[str, ...]
         f"{mean('delayed'):.3f}",
         f"{mean('cpu_minutes'):.1f}",
         f"{mean('steps') / 1e6:.1f}",
-        " / ".join(reached(bar) for bar in BARS),
-        *(f"{ground[k]:.3f}" for k in ("still", "random", "sticky")),
+        " / ".join(seconds_to(level) for level in THRESHOLDS),
+        *(f"{floor[k]:.3f}" for k in ("still", "random", "sticky")),
         f"{PAPER[name]:.1f}" if name in PAPER else "-",
     )
 

@@ -3,7 +3,7 @@
     python scripts/tutorial_rllib.py --iterations 3
 
 Plain RLlib on the PettingZoo environment, to copy from: `ParallelPettingZooEnv`, a
-policy of its own for each agent, a checkpoint, and a policy from it as a driver.
+separate policy for each agent, a checkpoint, and a policy from it as a driver.
 `airhockey train duel --engine rllib` is the fast way: its runners step many worlds.
 """
 
@@ -27,20 +27,20 @@ from ray.rllib.env.wrappers.pettingzoo_env import ParallelPettingZooEnv
 from ray.tune.registry import register_env
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.rllib import start_ray
 from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.policies import Policy
 
 
-def environment(_: Any) -> ParallelPettingZooEnv:
-    """A duel of 20 s as RLlib wants it."""
+def make_duel(_: Any) -> ParallelPettingZooEnv:
+    """Return a duel of 20 s as RLlib needs it."""
     env = ah.parallel_env("duel", backend="numba", options={"seconds": 20.0})
     return ParallelPettingZooEnv(env)
 
 
-def reload(checkpoint: Path, policy: str) -> Policy:
-    """One policy of a checkpoint as a driver."""
+def load_driver(checkpoint: Path, policy: str) -> Policy:
+    """Load one policy of a checkpoint as a driver."""
     path = checkpoint / "learner_group" / "learner" / "rl_module" / policy
     module = RLModule.from_checkpoint(str(path))
 
@@ -59,9 +59,9 @@ def main(
     num_env_runners: Annotated[int, typer.Option(help="Processes beside this.")] = 0,
     games: Annotated[int, typer.Option(help="Games of the evaluation.")] = 50,
 ) -> None:
-    """Train both, reload one, and play it against a random driver."""
+    """Train both policies, load one, and let it play a random driver."""
     start_ray(num_env_runners)
-    register_env("duel", environment)
+    register_env("duel", make_duel)
     names = ["p0", "p1"]
     network = DefaultModelConfig(fcnet_hiddens=[64, 64], vf_share_layers=False)
     spec = MultiRLModuleSpec(
@@ -95,8 +95,8 @@ def main(
     algorithm.save_to_path(str(checkpoint))
     algorithm.stop()
     rivals = [make_driver("random")]
-    score, _ = challenge(
-        "duel", reload(checkpoint, "p0"), rivals, games, 0, {"backend": "numba"}
+    score, _ = play_against(
+        "duel", load_driver(checkpoint, "p0"), rivals, games, 0, {"backend": "numba"}
     )
     print(f"{checkpoint}: p0 as a driver scores {score[0]:.3f} against random")
     ray.shutdown()

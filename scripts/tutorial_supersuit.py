@@ -2,11 +2,11 @@
 
     python scripts/tutorial_supersuit.py --steps 200000
 
-One policy learns to play both ends of a duel against itself. SuperSuit turns every
-agent into a slot of a vector environment; SB3 sees ordinary environments. Our
-own `make_sb3_vec` does the same for thousands of worlds at once, with seeds and the
-right values at time limits, which SuperSuit 3.11 lacks; `airhockey train duel` adds
-opponents. So this is the way for those who have a SuperSuit pipeline already.
+One policy learns to play both ends of a duel against itself. SuperSuit makes every
+agent a slot of a vector environment; SB3 sees ordinary environments. Our own
+`make_sb3_vec` does the same for thousands of worlds at once, with seeds and the right
+values at time limits, which SuperSuit 3.11 lacks; `airhockey train duel` adds
+opponents. So this suits those who have a SuperSuit pipeline already.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ import typer
 from stable_baselines3 import PPO
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.policies import Policy
 
 
-def environment(copies: int) -> Any:
-    """An SB3 VecEnv of ``copies`` duels: two slots each."""
+def make_vec_env(copies: int) -> Any:
+    """Return an SB3 VecEnv of ``copies`` duels with two slots each."""
     with warnings.catch_warnings():
-        # SuperSuit still asks gymnasium for names that it is going to drop.
+        # SuperSuit uses names that gymnasium has deprecated.
         warnings.simplefilter("ignore")
         import supersuit
     env = ah.parallel_env("duel", backend="numba", options={"seconds": 20.0})
@@ -43,9 +43,9 @@ def main(
     copies: Annotated[int, typer.Option(help="Duels at once.")] = 16,
     games: Annotated[int, typer.Option(help="Games of the evaluation.")] = 100,
 ) -> None:
-    """Train, and play against a random driver."""
+    """Train a policy and let it play a random driver."""
     torch.set_num_threads(1)  # small networks gain nothing from more
-    env = environment(copies)
+    env = make_vec_env(copies)
     model = PPO(
         "MlpPolicy",
         env,
@@ -64,7 +64,7 @@ def main(
         return np.asarray(model.predict(observation, deterministic=mean)[0])
 
     rivals = [make_driver("random")]
-    score, margin = challenge(
+    score, margin = play_against(
         "duel", Policy(predict), rivals, games, 0, {"backend": "numba"}
     )
     print(f"{model.num_timesteps:,} agent-steps at {rate:,.0f} per second")

@@ -3,8 +3,8 @@
     python scripts/tutorial_torchrl.py --updates 20
 
 `PettingZooWrapper` takes the environment as it is; `group_map` puts the mates into one
-group and `return_state` hands the critic what no agent sees alone. TorchRL steps one
-world at a time: it is the way to its algorithms (and BenchMARL's), not to speed.
+group and `return_state` gives the critic what no agent sees alone. TorchRL steps one
+world at a time: take it for its algorithms (and BenchMARL's), not for speed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ GROUP = "team_0"
 
 
 class StateCritic(nn.Module):
-    """One value for all agents from the global state."""
+    """Critic that gives all agents one value of the global state."""
 
     def __init__(self, size: int, agents: int) -> None:
         super().__init__()
@@ -43,22 +43,22 @@ class StateCritic(nn.Module):
         )
 
     def forward(self, state: torch.Tensor) -> torch.Tensor:
-        """(..., agents, 1) for states (..., D)."""
+        """Return (..., agents, 1) values of states (..., D)."""
         value: torch.Tensor = self.net(state)
         return value[..., None, :].expand(*value.shape[:-1], self.agents, 1)
 
 
 class WithoutInfos(BaseParallelWrapper[Any, Any, Any]):  # type: ignore[misc]
-    """TorchRL makes tensors of infos, which ours, with their names, are not."""
+    """Wrapper that empties infos: TorchRL makes tensors of them, ours hold names."""
 
     def reset(self, seed: int | None = None, options: Any = None) -> Any:
-        """The same, with nothing in the infos."""
+        """Reset the environment; return observations and empty infos."""
         seen, infos = self.env.reset(seed, options)
         return seen, {agent: {} for agent in infos}
 
 
-def environment() -> TransformedEnv:
-    """A rally as TorchRL wants it, with the return of episodes."""
+def make_rally() -> TransformedEnv:
+    """Return a rally as TorchRL needs it, with the return of episodes."""
     raw = ah.parallel_env("rally", backend="numba")
     env = PettingZooWrapper(
         WithoutInfos(raw),
@@ -71,27 +71,18 @@ def environment() -> TransformedEnv:
     return TransformedEnv(env, returns)
 
 
-def main(
-    updates: Annotated[int, typer.Option(help="Policy updates.")] = 20,
-    frames: Annotated[int, typer.Option(help="Steps between two updates.")] = 2000,
-    seed: Annotated[int, typer.Option(help="Of network and environment.")] = 0,
-) -> None:
-    """Check the environment, then train."""
-    torch.manual_seed(seed)
-    torch.set_num_threads(1)
-    env = environment()
-    env.set_seed(seed)
-    check_env_specs(env)
+def make_actor(env: TransformedEnv) -> ProbabilisticActor:
+    """Return a policy that all agents share, each acting on its own observation."""
     agents, size = env.observation_spec[GROUP, "observation"].shape
-    actor_net = nn.Sequential(
+    network = nn.Sequential(
         MultiAgentMLP(
             size, 4, agents, centralized=False, share_params=True, depth=2, num_cells=64
         ),
         NormalParamExtractor(),
     )
     keys = [(GROUP, "loc"), (GROUP, "scale")]
-    actor = ProbabilisticActor(
-        TensorDictModule(actor_net, in_keys=[(GROUP, "observation")], out_keys=keys),
+    return ProbabilisticActor(
+        TensorDictModule(network, in_keys=[(GROUP, "observation")], out_keys=keys),
         spec=env.full_action_spec[GROUP, "action"],
         in_keys=keys,
         out_keys=[(GROUP, "action")],
@@ -99,6 +90,11 @@ def main(
         return_log_prob=True,
         log_prob_key=(GROUP, "log_prob"),
     )
+
+
+def make_loss(env: TransformedEnv, actor: ProbabilisticActor) -> ClipPPOLoss:
+    """Return PPO's loss with a critic of the global state."""
+    agents = env.observation_spec[GROUP, "observation"].shape[0]
     critic = TensorDictModule(
         StateCritic(env.observation_spec["state"].shape[-1], agents),
         in_keys=["state"],
@@ -114,6 +110,22 @@ def main(
         terminated=(GROUP, "terminated"),
     )
     loss.make_value_estimator(ValueEstimators.GAE, gamma=0.98, lmbda=0.95)
+    return loss
+
+
+def main(
+    updates: Annotated[int, typer.Option(help="Policy updates.")] = 20,
+    frames: Annotated[int, typer.Option(help="Steps between two updates.")] = 2000,
+    seed: Annotated[int, typer.Option(help="Of network and environment.")] = 0,
+) -> None:
+    """Check the environment, then train."""
+    torch.manual_seed(seed)
+    torch.set_num_threads(1)
+    env = make_rally()
+    env.set_seed(seed)
+    check_env_specs(env)
+    actor = make_actor(env)
+    loss = make_loss(env, actor)
     optimizer = torch.optim.Adam(loss.parameters(), lr=1e-3)
     collector = Collector(
         env,

@@ -16,7 +16,7 @@ from test_tutorials import run
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.export import export
+from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
 
@@ -53,15 +53,15 @@ def test_it_learns_and_its_policy_drives_without_ray(tmp_path):
         "assert 'ray' not in sys.modules and 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-    frozen = export(folder, tmp_path / "touch.npz")
+    frozen = export_policy(folder, tmp_path / "touch.npz")
     assert "engine" in frozen.card["command"]
 
 
 def test_self_play_goes_on_when_a_runner_is_killed(tmp_path):
-    from marl_airhockey.learn.rllib import algorithm, start_ray
+    from marl_airhockey.learn.rllib import build_algorithm, start_ray
 
     start_ray(2)
-    algo = algorithm(preset("duel", {**DUEL, "num_env_runners": 2}), tmp_path)
+    algo = build_algorithm(preset("duel", {**DUEL, "num_env_runners": 2}), tmp_path)
     group = algo.env_runner_group
     pids = group.foreach_env_runner(lambda _: os.getpid(), local_env_runner=False)
     assert len(set(pids)) == 2
@@ -101,7 +101,7 @@ def test_a_killed_run_goes_on_where_it_stood(tmp_path):
     row = train(None, folder)
     assert row["steps"] >= 400_000
     assert [int(r["steps"]) for r in rows(folder)][: len(stood)] == stood
-    assert len(list(folder.glob("checkpoint-*"))) == 1
+    assert len(list(folder.glob("rllib-*"))) == 1
 
 
 def test_the_tutorial_runs():

@@ -8,7 +8,8 @@ from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import make_driver
-from marl_airhockey.transfer.system_id import FITTED, fit, play, recorded
+from marl_airhockey.transfer.recorded_play import load_recordings, record_play
+from marl_airhockey.transfer.system_id import FITTED, fit_physics
 
 pytest.importorskip("scipy")
 OTHER = {
@@ -21,12 +22,12 @@ OTHER = {
 
 def test_the_physics_of_another_table_are_found(tmp_path):
     table = {"backend": "pymunk", "physics": OTHER}
-    seen = play("juggle", make_driver("zoo/juggle"), 1500, 0, table)
-    found = fit(seen)
+    seen = record_play("juggle", make_driver("zoo/juggle"), 1500, 0, table)
+    found = fit_physics(seen)
     for name in FITTED:
         assert found.physics[name] == pytest.approx(OTHER[name], rel=0.12), name
     assert found.physics["action_delay"] < 0.003
-    assert found.closed > 0.8
+    assert found.error_reduction > 0.8
     path = tmp_path / "fit.toml"
     path.write_text(found.to_toml())
     assert load_physics(path) == pytest.approx(found.physics, rel=1e-4)
@@ -38,10 +39,10 @@ def test_the_physics_of_another_table_are_found(tmp_path):
 def test_an_arm_is_nearer_to_the_fitted_table():
     pytest.importorskip("robosuite")
     there = {"backend": "robosuite", "physics": OTHER}
-    seen = play("juggle", make_driver("zoo/juggle"), 1000, 0, there)
-    found = fit(seen)
+    seen = record_play("juggle", make_driver("zoo/juggle"), 1000, 0, there)
+    found = fit_physics(seen)
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.2)
-    assert found.closed > 0.5
+    assert found.error_reduction > 0.5
 
 
 def test_recordings_are_fitted_to(tmp_path):
@@ -53,26 +54,26 @@ def test_recordings_are_fitted_to(tmp_path):
         while match.phase != "done":
             session.tick()
         session.tick()
-    seen = recorded(sorted(tmp_path.glob("*.jsonl")))
+    seen = load_recordings(sorted(tmp_path.glob("*.jsonl")))
     assert seen.control_dt == pytest.approx(1 / RATE)
     assert not seen.follows[0]
     assert np.isfinite(seen.position).all()
     with pytest.raises(ValueError, match="one scenario are needed"):
-        recorded([])
-    found = fit(seen)
+        load_recordings([])
+    found = fit_physics(seen)
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.1)
     with pytest.raises(ValueError, match="too few"):
-        fit(play("juggle", make_driver("striker"), 100, 0, {}))
+        fit_physics(record_play("juggle", make_driver("striker"), 100, 0, {}))
     with pytest.raises(ValueError, match="blocks"):
-        fit(play("move_block", make_driver("striker"), 10, 0, {}))
+        fit_physics(record_play("move_block", make_driver("striker"), 10, 0, {}))
 
 
 def test_a_puck_that_is_served_is_not_fitted_to():
     drivers = {"paddle_1": "still"}
     options = {"drivers": drivers, "options": {"seats": "arcade"}}
-    seen = play("duel", make_driver("striker"), 1500, 0, options)
+    seen = record_play("duel", make_driver("striker"), 1500, 0, options)
     way = np.hypot(*np.diff(seen.position[:, 2], axis=0).T)
     served = np.flatnonzero(way > 0.4) + 1
     assert len(served) > 2
-    for first in seen.stretches(5):
+    for first in seen.segment_starts(5):
         assert not ((served > first) & (served <= first + 5)).any()

@@ -7,8 +7,8 @@ import pytest
 from test_learn import SMALL, rows
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.games import play
-from marl_airhockey.evaluation.league import found_in, league
+from marl_airhockey.evaluation.games import play_games
+from marl_airhockey.evaluation.league import find_policies, play_league
 from marl_airhockey.evaluation.stats import (
     bootstrap,
     elo,
@@ -17,8 +17,8 @@ from marl_airhockey.evaluation.stats import (
 )
 from marl_airhockey.learn.best_response import best_response
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.sb3 import build
-from marl_airhockey.learn.self_play import environment
+from marl_airhockey.learn.sb3 import build_model
+from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.numpy_policy import Frozen
@@ -68,7 +68,7 @@ def test_who_sits_where_differs_by_world():
 def test_games_have_a_winner_or_none_and_ends_do_not_matter():
     players = [make_driver("allround"), make_driver("random")]
     lineups = np.array([[0, 1]] * 20 + [[1, 0]] * 20)
-    found = play("duel", players, lineups, 0, {"backend": "numba"})
+    found = play_games("duel", players, lineups, 0, {"backend": "numba"})
     np.testing.assert_allclose(found.score.sum(-1), 1.0)
     np.testing.assert_allclose(found.margin.sum(-1), 0.0)
     mine = found.score[lineups == 0]
@@ -76,16 +76,16 @@ def test_games_have_a_winner_or_none_and_ends_do_not_matter():
     assert mine[20:].mean() > 0.9
     assert (found.seconds <= 60.0 + 1e-6).all()
     everybody = np.array([[0, 1, 1, 1]] * 12)
-    crowd = play("free_for_all", players, everybody, 0, {"backend": "numba"})
+    crowd = play_games("free_for_all", players, everybody, 0, {"backend": "numba"})
     assert crowd.won[:, 0].mean() > 0.5
     with pytest.raises(ValueError, match="no teams"):
-        play("rally", players, lineups, 0)
+        play_games("rally", players, lineups, 0)
 
 
 def test_a_league_rates_and_names_its_files(tmp_path):
     names = ("random", "allround", "striker:strength=weak", "still")
     players = {name: make_driver(name) for name in names}
-    standings = league("duel", players, 20, keywords=SHORT)
+    standings = play_league("duel", players, 20, keywords=SHORT)
     off = ~np.eye(4, dtype=bool)
     np.testing.assert_allclose((standings.score + standings.score.T)[off], 1.0)
     np.testing.assert_allclose(standings.margin, -standings.margin.T)
@@ -98,11 +98,11 @@ def test_a_league_rates_and_names_its_files(tmp_path):
     assert report["players"][0] == report["table"][0]["player"] == "allround"
     assert "| allround |" in files[1].read_text()
     with pytest.raises(ValueError, match="two players"):
-        league("duel", {"still": players["still"]}, 2)
+        play_league("duel", {"still": players["still"]}, 2)
 
 
 def test_a_circle_is_named():
-    standings = league("duel", {n: make_driver(n) for n in ("still", "random")}, 2)
+    standings = play_league("duel", {n: make_driver(n) for n in ("still", "random")}, 2)
     wins = np.array([[0, 90, 5], [5, 0, 90], [90, 5, 0]])
     three = type(standings)(
         "duel", ("a", "b", "c"), 100, wins, np.full((3, 3), 5), *np.zeros((3, 3, 3))
@@ -137,13 +137,13 @@ GAME |= {"options": {"seconds": 3.0}, "eval_episodes": 4, "pool": 2, "mirror": 0
 GAME |= {"total_steps": 6144, "opponents": ["random", "goalkeeper"]}
 
 
-def arena(folder, **changes):
+def training_env(folder, **changes):
     config = preset("doubles", {**GAME, **changes})
-    return config, environment(config, config.num_worlds, folder)
+    return config, make_training_env(config, config.num_worlds, folder)
 
 
-def test_learners_and_opponents_share_an_arena(tmp_path):
-    _, env = arena(tmp_path)
+def test_learners_and_opponents_share_an_environment(tmp_path):
+    _, env = training_env(tmp_path)
     assert env.num_envs == 16 * 4 + 16 * 2
     seen = env.reset()
     assert seen.shape == (env.num_envs, env.observation_space.shape[0])
@@ -169,7 +169,7 @@ def test_learners_and_opponents_share_an_arena(tmp_path):
 
 
 def test_hard_opponents_come_more_often(tmp_path):
-    _, env = arena(tmp_path, opponents=["random", "goalkeeper"])
+    _, env = training_env(tmp_path, opponents=["random", "goalkeeper"])
     env._scores[:] = 0.95, 0.2
     drawn = np.bincount(env._draw(4000), minlength=2) / 4000
     assert drawn[1] > 0.9
@@ -183,7 +183,7 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     assert set(last) >= {"score", "score/random", "return"}
     assert len(rows(folder)) >= 2
     assert len(list((folder / "pool").glob("*.npz"))) == 2
-    past = sorted((folder / "milestones").glob("*.npz"))
+    past = sorted((folder / "checkpoints").glob("*.npz"))
     assert len(past) >= 2
     policy, old = load_policy(folder / "last.zip"), load_policy(past[-1])
     world = ah.make_world("duel", 8, backend="numba")
@@ -193,17 +193,17 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     text = (folder / "config.toml").read_text().replace("= 6144", "= 9216")
     (folder / "config.toml").write_text(text)
     assert train(None, folder)["steps"] > last["steps"]
-    assert found_in(tmp_path) == [str(folder)]
+    assert find_policies(tmp_path) == [str(folder)]
 
 
 def test_a_frozen_policy_is_one_small_file(tmp_path):
     config = preset("reach", SMALL)
     env = ah.make_sb3_vec("reach", 32, backend="numba")
-    from marl_airhockey.learn.network import freeze
-    from marl_airhockey.learn.sb3_callback import Rate
+    from marl_airhockey.learn.network import to_numpy
+    from marl_airhockey.learn.sb3_callback import AdaptiveRate
 
-    model = build(config, env, Rate(config, 1e-3))
-    freeze(model, {"scenario": "reach"}).save(tmp_path / "policy.npz")
+    model = build_model(config, env, AdaptiveRate(config, 1e-3))
+    to_numpy(model, {"scenario": "reach"}).save(tmp_path / "policy.npz")
     assert (tmp_path / "policy.npz").stat().st_size < 300_000
     driver = make_driver(tmp_path / "policy.npz")
     seen = env.reset()

@@ -18,9 +18,12 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.config import TrainConfig, load_config, preset
+from marl_airhockey.learn.best_response import best_response
+from marl_airhockey.learn.config import RUN_FORMAT, TrainConfig, load_config, preset
+from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.train import train
 from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.transfer.measure import fine_tuning_config
 
 SMALL = {
     "total_steps": 16_384,
@@ -60,6 +63,30 @@ def test_a_configuration_survives_its_file(tmp_path):
     path.write_text("nothing = 1")
     with pytest.raises(ValueError, match="no training configuration"):
         load_config(path)
+
+
+@pytest.mark.parametrize("found", [1, 99])
+def test_a_run_of_another_format_is_refused(tmp_path, found):
+    folder = tmp_path / "old"
+    folder.mkdir()
+    for name in ("last.zip", "state.json"):
+        (folder / name).touch()
+    first, _, settings = preset("duel", SMALL).to_toml().partition("\n")
+    assert first == f"format = {RUN_FORMAT}"
+    # The first runs had no number.
+    number = "" if found == 1 else f"format = {found}\n"
+    (folder / "config.toml").write_text(number + settings)
+    fresh = preset("duel", {**SMALL, "init": str(folder)})
+    for use in (
+        lambda: train(None, folder),
+        lambda: train(fresh, tmp_path / "fresh"),
+        lambda: export_policy(folder, tmp_path / "policy.npz"),
+        lambda: fine_tuning_config(folder, 64),
+        lambda: best_response("duel", "still", 64, folder),
+    ):
+        with pytest.raises(ValueError, match=f"another version .*format {found}"):
+            use()
+    assert not (tmp_path / "policy.npz").exists()
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.render.renderer import SEAT_COLOURS, Frame, draw
+from marl_airhockey.render.picture import SEAT_COLOURS, Frame, draw
 
 
 def test_a_picture_shows_the_paddle_where_it_is(scenario):

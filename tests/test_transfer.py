@@ -8,7 +8,11 @@ from marl_airhockey.cli.main import app
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_driver
-from marl_airhockey.transfer.measure import measure, picture, tuned
+from marl_airhockey.transfer.measure import (
+    fine_tuning_config,
+    measure_transfer,
+    plot_transfer,
+)
 
 SMALL = {
     "total_steps": 2048,
@@ -24,12 +28,12 @@ def test_success_is_measured_in_all_physics(tmp_path):
     pytest.importorskip("robosuite")
     backends = ["numba", "pymunk", "robosuite"]
     policies = {"zoo": make_driver("zoo/reach"), "nothing": make_driver("still")}
-    rows = measure(policies, "reach", backends, ["ideal"], episodes=20)
+    rows = measure_transfer(policies, "reach", backends, ["ideal"], episodes=20)
     assert [row.backend for row in rows] == backends * 2
     assert min(row.success for row in rows[:3]) > 0.8
     assert max(row.success for row in rows[3:]) == 0.0
     assert json.dumps(rows[0].to_json())
-    picture(rows, tmp_path / "transfer.png")
+    plot_transfer(rows, tmp_path / "transfer.png")
     assert (tmp_path / "transfer.png").stat().st_size > 1000
 
 
@@ -40,7 +44,7 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
     again = train(config, tmp_path / "second")["success"]
     assert again >= learned - 0.3
     assert again > train(preset("reach", SMALL), tmp_path / "fresh")["success"]
-    elsewhere = tuned(tmp_path / "first", 4096)
+    elsewhere = fine_tuning_config(tmp_path / "first", 4096)
     assert (elsewhere.backend, elsewhere.init) == ("robosuite", str(tmp_path / "first"))
     assert elsewhere.observe == first.observe
     wrong = preset(

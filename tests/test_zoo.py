@@ -7,7 +7,7 @@ import pytest
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.registry import ZOO, make_driver, zoo_names
 from marl_airhockey.toolkit.numpy_policy import Frozen
 
@@ -32,7 +32,7 @@ def test_it_is_small_and_as_good_as_its_card(name):
     for rival, (_, low, _) in grades["score"].items():
         rivals = [make_driver(rival)]
         driver = ah.make_agent(name)
-        score, _ = challenge(card["scenario"], driver, rivals, 40, 7, options)
+        score, _ = play_against(card["scenario"], driver, rivals, 40, 7, options)
         assert score[0] >= low - 0.2
 
 

@@ -35,7 +35,7 @@ def bench_environments(
     as_json: AsJson = False,
 ) -> None:
     """Measure env-steps per second, of CPU and of time."""
-    from marl_airhockey.evaluation.speed import Case, measure, picture
+    from marl_airhockey.evaluation.speed import Case, measure_speed, plot_speed
 
     try:
         numbers = [int(n) for n in worlds.split(",")]
@@ -51,10 +51,10 @@ def bench_environments(
     ]
     with bar() as progress:
         task = progress.add_task("measuring", total=rounds * len(cases), note="")
-        rates = measure(cases, rounds, seconds, lambda: progress.advance(task))
+        rates = measure_speed(cases, rounds, seconds, lambda: progress.advance(task))
     if out is not None:
         require("matplotlib", "train")
-        picture(rates, out)
+        plot_speed(rates, out)
     if as_json:
         console.print_json(json.dumps([rate.to_json() for rate in rates]))
         return

@@ -24,7 +24,7 @@ from marl_airhockey.cli.options import (
     console,
     environment,
 )
-from marl_airhockey.evaluation.evaluate import TEST_SEED, Result, evaluate
+from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
 from marl_airhockey.registry import make_driver
 from marl_airhockey.toolkit.policies import Policy
 
@@ -58,7 +58,7 @@ def evaluate_driver(
         entries.append((f"{driver} (sampled)", sampled))
     if floors:
         entries += [(f, make_driver(f)) for f in FLOORS if f != driver]
-    results: list[Result] = []
+    results: list[EvaluationResult] = []
     with bar() as progress:
         task = progress.add_task(scenario, total=len(entries), note="")
         for name, entry in entries:
@@ -75,7 +75,7 @@ def evaluate_driver(
     console.print(result_table(results))
 
 
-def result_table(results: list[Result]) -> Table:
+def result_table(results: list[EvaluationResult]) -> Table:
     """Return a table with a column for each driver."""
     first = results[0]
     table = Table(
@@ -85,7 +85,7 @@ def result_table(results: list[Result]) -> Table:
     table.add_column("")
     for result in results:
         table.add_column(result.driver, justify="right")
-    lines: dict[str, Callable[[Result], str]] = {
+    lines: dict[str, Callable[[EvaluationResult], str]] = {
         "success": lambda r: f"{r.success:.3f}",
         "  95 % from": lambda r: f"{r.success_interval[0]:.3f}",
         "  95 % to": lambda r: f"{r.success_interval[1]:.3f}",

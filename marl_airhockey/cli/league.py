@@ -19,8 +19,7 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.core.errors import require
-from marl_airhockey.evaluation.league import found_in
-from marl_airhockey.evaluation.league import league as play_league
+from marl_airhockey.evaluation.league import find_policies, play_league
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.registry import make_driver
 
@@ -63,7 +62,7 @@ def league(
     """Let everybody play everybody: ratings, matrix, circles of wins."""
     require("matplotlib", "train")
     names = list(players or ([] if folder else SCRIPTS))
-    names += found_in(folder) if folder else []
+    names += find_policies(folder) if folder else []
     keywords = environment(backend, profile, option, None)
     entrants = {label(name, names): make_driver(name) for name in names}
     standings = play_league(scenario, entrants, games, keywords=keywords)

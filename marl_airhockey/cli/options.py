@@ -16,7 +16,7 @@ from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.config import TrainConfig
-    from marl_airhockey.learn.grade import Grades
+    from marl_airhockey.learn.grade import Metrics
 
 app = typer.Typer(
     help="Air hockey for robot learning and multi-agent RL.",
@@ -103,7 +103,7 @@ def bar() -> Progress:
     )
 
 
-def train_with_progress(config: TrainConfig | None, folder: Path) -> Grades:
+def train_with_progress(config: TrainConfig | None, folder: Path) -> Metrics:
     """Call `learn.train.train` with a progress bar."""
     from marl_airhockey.learn.train import train
 

@@ -115,9 +115,9 @@ def export(
 ) -> None:
     """Freeze a trained policy into one small file with a card, measured anew."""
     require("stable_baselines3", "train")
-    from marl_airhockey.learn.export import export as freeze
+    from marl_airhockey.learn.export import export_policy
 
-    console.print_json(json.dumps(dict(freeze(run, out).card)))
+    console.print_json(json.dumps(dict(export_policy(run, out).card)))
     console.print(f"{out}: {out.stat().st_size / 1000:.0f} kB")
 
 
@@ -131,7 +131,7 @@ def demo(
 ) -> None:
     """Train a paddle to juggle, measure it, and show what it learned."""
     require("stable_baselines3", "train")
-    from marl_airhockey.learn.demo import run
+    from marl_airhockey.learn.demo import run_demo
 
     with bar() as progress:
         task = progress.add_task(f"learning to {scenario}", total=None, note="")
@@ -142,7 +142,7 @@ def demo(
             note = f"{name} {row[name]:.2f}" if row else ""
             progress.update(task, completed=done, total=total, note=note)
 
-        results, files = run(scenario, out, steps, report)
+        results, files = run_demo(scenario, out, steps, report)
     console.print(result_table(results))
     for what, path in files.items():
         console.print(f"{what:>16}: {path}")

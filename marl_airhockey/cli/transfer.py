@@ -27,7 +27,7 @@ from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.config import TrainConfig
-    from marl_airhockey.transfer.measure import Transfer
+    from marl_airhockey.transfer.measure import TransferResult
 
 
 def transfer(
@@ -59,7 +59,7 @@ def transfer(
     as_json: AsJson = False,
 ) -> None:
     """Measure policies from the 2D table elsewhere: success with 95 % intervals."""
-    from marl_airhockey.transfer.measure import measure, picture
+    from marl_airhockey.transfer.measure import measure_transfer, plot_transfer
 
     folder = out or Path("runs") / f"transfer-{scenario}"
     # Everything that may be wrong is checked before anything takes time.
@@ -70,7 +70,7 @@ def transfer(
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)
         task = progress.add_task("measuring", total=total, note="")
-        rows = measure(
+        rows = measure_transfer(
             policies,
             scenario,
             backends,
@@ -83,7 +83,7 @@ def transfer(
     data = json.dumps([row.to_json() for row in rows], indent=1)
     (folder / "transfer.json").write_text(data)
     require("matplotlib", "train")
-    picture(rows, folder / "transfer.png")
+    plot_transfer(rows, folder / "transfer.png")
     if as_json:
         console.print_json(data)
         return
@@ -103,21 +103,21 @@ def _policies(
         seed: of training.
         folder: of the runs.
     """
-    from marl_airhockey.transfer.measure import schooled, tuned
+    from marl_airhockey.transfer.measure import fine_tuning_config, pretraining_config
 
     for name in names:
         make_driver(name)
     names = list(names)
     if not names:
         for kind in PROFILES:
-            names.append(_run(folder / kind, schooled(scenario, kind, seed)))
+            names.append(_run(folder / kind, pretraining_config(scenario, kind, seed)))
     if fine_tune:
         runs = [n for n in names if (Path(n) / "config.toml").exists()]
         if not runs:
             raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
         for name in runs:
             run = folder / f"{Path(name).name}-tuned-{fine_tune}"
-            names.append(_run(run, tuned(Path(name), fine_tune)))
+            names.append(_run(run, fine_tuning_config(Path(name), fine_tune)))
     policies: dict[str, Driver] = {}
     for name in names:
         short = Path(name).name if Path(name).exists() else name
@@ -125,7 +125,7 @@ def _policies(
     return policies
 
 
-def _table(rows: list[Transfer], title: str) -> Table:
+def _table(rows: list[TransferResult], title: str) -> Table:
     """Return a table with a row for each policy and backend, a column for a profile."""
     table = Table("policy", "in", title=title)
     for kind in dict.fromkeys(row.profile for row in rows):
@@ -182,22 +182,22 @@ def fit(
     out: Annotated[Path, typer.Option(help="The preset.")] = Path("fit.toml"),
 ) -> None:
     """Fit the 2D table's physics to play on another one, for --physics FILE."""
-    from marl_airhockey.transfer.system_id import fit as find
-    from marl_airhockey.transfer.system_id import play, recorded
+    from marl_airhockey.transfer.recorded_play import load_recordings, record_play
+    from marl_airhockey.transfer.system_id import fit_physics
 
     if recordings is not None:
-        seen = recorded(sorted(recordings.glob("*.jsonl")))
+        seen = load_recordings(sorted(recordings.glob("*.jsonl")))
     else:
         player = make_driver(driver or f"zoo/{scenario}")
         there = load_physics(physics) if physics else {}
         with console.status(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}
-            seen = play(scenario, player, steps, seed, keywords)
+            seen = record_play(scenario, player, steps, seed, keywords)
     with console.status("fitting"):
-        found = find(seen)
+        found = fit_physics(seen)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(found.to_toml())
-    table = Table("", "usual values", "fitted", title=f"{found.stretches} stretches")
+    table = Table("", "usual values", "fitted", title=f"{found.segments} segments")
     for name, value in found.physics.items():
         usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
         table.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
@@ -205,4 +205,6 @@ def fit(
         errors = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
         table.add_row(name, *errors)
     console.print(table)
-    console.print(f"{found.closed:.0%} of the pucks' error is gone; wrote {out}")
+    console.print(
+        f"{found.error_reduction:.0%} of the pucks' error is gone; wrote {out}"
+    )

@@ -48,7 +48,7 @@ def watch(
 
     --host, --port and --browser are those of a recording's page.
     """
-    from marl_airhockey.evaluation.watch import film
+    from marl_airhockey.evaluation.watch import show_episodes
 
     if driver.endswith(".jsonl"):
         if video is None:
@@ -62,7 +62,7 @@ def watch(
         raise ValueError("--scenario: say what the driver is to play")
     keywords = environment(backend, profile, option, other)
     player = make_driver(driver)
-    film(scenario, player, keywords, seed, episodes, video, camera=camera)
+    show_episodes(scenario, player, keywords, seed, episodes, video, camera=camera)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 

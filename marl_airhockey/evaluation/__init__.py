@@ -1,1 +1,1 @@
-"""Play and measure: episodes, games, leagues, speed."""
+"""Evaluation: episodes, games, leagues, speed, statistics."""

@@ -1,4 +1,4 @@
-"""How all plots look."""
+"""Common look of all plots, by matplotlib."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from marl_airhockey.types import Array
 
 INK, PALE = "#0072B2", "#86b8d8"
 INKS = ("#8a8f98", "#b06a00", "#00805c")
-"""Of what stands beside the main line."""
+"""Colours of what is drawn beside the main line"""
 DPI = 130
 
 
 def tidy(axes: Axes, legend: Literal["best", "center right"] | None = "best") -> None:
-    """Take off what says nothing; ``legend`` is its place, or None."""
+    """Remove needless spines, add a grid, and a legend at ``legend`` unless None."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(alpha=0.25)
     if legend is not None:
@@ -31,13 +31,13 @@ def tidy(axes: Axes, legend: Literal["best", "center right"] | None = "best") ->
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG and let go of the figure."""
+    """Write a figure as PNG, make its folder, and close the figure."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
     plt.close(figure)
 
 
-def curve(axes: Axes, x: Array, runs: Array, ink: str, label: str = "") -> None:
+def plot_iqm(axes: Axes, x: Array, runs: Array, ink: str, label: str = "") -> None:
     """Draw the interquartile mean of runs (runs, points) and its 95 % interval."""
     points = np.asarray(runs).T
     middle = [iqm(point) for point in points]

@@ -1,4 +1,4 @@
-"""Deployability: see the definitions."""
+"""Deployability: a summary of a driver's fitness for a real arm."""
 
 from __future__ import annotations
 
@@ -9,38 +9,49 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Deployability:
-    """How fit a driver is for a real arm, summed up in a class.
+    """Fitness of a driver for a real arm, summed up in a grade.
 
-    * A: violations of at most 1 minute in 100, power above 5 Hz at most 10 %,
-      decisions within 5 ms.
-    * B: at most 1 in 10, 25 %, 10 ms.   * C: at most 1 in 2, 50 %, 25 ms.   * D: else.
+    * A: violations in at most 1 of 100 control steps, at most 10 % of the power above
+      5 Hz, decisions within 5 ms.
+    * B: at most 1 of 10, 25 %, 10 ms.
+    * C: at most 1 of 2, 50 %, 25 ms.
+    * D: all others.
     """
 
     violations_per_minute: float
-    """Control steps a minute in which what was asked exceeded speed, acceleration,
-    jerk or reach"""
+    """Control steps per minute in which the action exceeded the limits of speed,
+    acceleration, jerk or reach"""
     jerk: float
-    """Root mean square of the sent jerk, m/s3"""
+    """Root mean square of the commands' jerk, m/s3"""
     power_above_5hz: float
-    """Share of the power of the asked actions above 5 Hz; nan below 10 Hz of control"""
+    """Share of the actions' power above 5 Hz; nan for control below 10 Hz"""
     act_ms: float
-    """Milliseconds of CPU that a decision for one world takes, median"""
+    """Median CPU time of a decision for one world, ms"""
     grade: str
+    """A, B, C or D"""
 
     @staticmethod
     def of(
         violations: float, jerk: float, power: float, act_ms: float, control_dt: float
     ) -> Deployability:
-        """Sum the measures up; ``violations`` is a share of the steps."""
-        shares = {"A": (0.01, 0.10, 5.0), "B": (0.1, 0.25, 10.0), "C": (0.5, 0.5, 25.0)}
+        """Sum the measures up in a grade.
+
+        Args:
+            violations: share of the control steps with a violation.
+            jerk: see `jerk`.
+            power: see `power_above_5hz`.
+            act_ms: see `act_ms`.
+            control_dt: length of a control step, s.
+        """
+        bounds = {"A": (0.01, 0.10, 5.0), "B": (0.1, 0.25, 10.0), "C": (0.5, 0.5, 25.0)}
         high = 0.0 if np.isnan(power) else power
         grade = next(
             (
                 name
-                for name, (v, p, ms) in shares.items()
+                for name, (v, p, ms) in bounds.items()
                 if violations <= v and high <= p and act_ms <= ms
             ),
             "D",
         )
-        minute = violations * 60 / control_dt
-        return Deployability(minute, jerk, power, act_ms, grade)
+        per_minute = violations * 60 / control_dt
+        return Deployability(per_minute, jerk, power, act_ms, grade)

@@ -1,4 +1,4 @@
-"""Play and measure: a driver in a scenario, over many episodes at once."""
+"""Evaluation of a driver in a scenario, over many episodes at once."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world, find_scenario
+from marl_airhockey.world.episode import StepResult
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000
-"""First of the seeds that training never sees."""
+"""First of the seeds that training never sees"""
 
 
 @dataclass(frozen=True)
-class Result:
-    """What a driver achieved over some episodes."""
+class EvaluationResult:
+    """Measures of a driver over some episodes."""
 
     driver: str
     scenario: str
@@ -32,36 +33,43 @@ class Result:
     episodes: int
     success: float
     success_interval: tuple[float, float]
-    """95 %, Wilson's."""
+    """95 % interval of the success, Wilson's"""
     first_shot: float
-    """Share that succeeded before a second distinct touch."""
+    """Share of episodes that succeeded before a second distinct touch"""
     returns: float
+    """Mean return"""
     returns_iqm: float
-    """Interquartile mean, which a few odd episodes do not move."""
+    """Interquartile mean of the returns, robust against a few odd episodes"""
     returns_interval: tuple[float, float]
-    """95 %, of the interquartile mean, by bootstrap."""
+    """95 % interval of the interquartile mean, by bootstrap"""
     length: float
-    """Control steps, mean."""
+    """Mean length of an episode, control steps"""
     hits: float
-    """Distinct touches, mean."""
+    """Mean number of distinct touches in an episode"""
     deployability: Deployability
 
     def to_json(self) -> dict[str, Any]:
-        """For a report; `returns` is called return there."""
+        """Return the fields as a JSON object, `returns` under the key "return"."""
         data = asdict(self)
         data["return"] = data.pop("returns")
         return data
 
 
-def seat_world(
+def build_driven_world(
     driver: Driver, scenario: str | Scenario, num_worlds: int, keywords: Keywords
 ) -> World:
-    """Worlds in which a driver sits at ``paddle_0`` and at its mates' seats.
+    """Build worlds in which a driver has ``paddle_0`` and its mates' seats.
 
-    All other seats must be driven, too.
+    All other seats need drivers, too. Episodes do not restart by themselves.
+
+    Args:
+        driver: driver of the team of ``paddle_0``.
+        scenario: name of the scenario, or a scenario object.
+        num_worlds: number of worlds.
+        keywords: keywords of the environment; its drivers come first for mates' seats.
 
     Raises:
-        ValueError: a seat that nobody drives, named.
+        ValueError: a seat without a driver, named.
     """
     scene = find_scenario(scenario, keywords).scene
     team = [i for i, s in enumerate(scene.seats) if s.team == scene.seats[0].team]
@@ -84,30 +92,30 @@ def evaluate(
     episodes: int = 200,
     seed: int = TEST_SEED,
     keywords: Keywords | None = None,
-) -> Result:
-    """Let a driver sit at ``paddle_0`` for some episodes, all at once.
+) -> EvaluationResult:
+    """Let a driver play some episodes at ``paddle_0``, all at once, and measure it.
 
     Args:
-        driver: who plays.
-        name: what to call it in the result.
-        scenario: its name, or a scenario object.
-        episodes: how many; episode i is world i's first with seed + i.
-        seed: of the first episode.
-        keywords: of the environment, drivers of other seats among them, see
-            `make.build_world`.
+        driver: driver that plays.
+        name: name of the driver in the result.
+        scenario: name of the scenario, or a scenario object.
+        episodes: number of episodes; episode i is the first of world i, with seed + i.
+        seed: seed of the first episode.
+        keywords: keywords of the environment, drivers of other seats among them; see
+            `build_world`.
 
     Raises:
-        ValueError: a seat that nobody drives, named.
+        ValueError: a seat without a driver, named.
     """
     keywords = keywords if keywords is not None else {}
-    world = seat_world(driver, scenario, episodes, keywords)
+    world = build_driven_world(driver, scenario, episodes, keywords)
     world.reset(seed)
-    tally = _Tally(world)
-    nobody = np.zeros((episodes, 0, 2))
-    while not tally.done.all():
-        tally.add(world.step(nobody))
-    success = float(tally.success.mean())
-    result = Result(
+    statistics = _EpisodeStatistics(world)
+    no_actions = np.zeros((episodes, 0, 2))
+    while not statistics.done.all():
+        statistics.add(world.step(no_actions))
+    success = float(statistics.success.mean())
+    result = EvaluationResult(
         driver=name,
         scenario=world.scenario.name,
         backend=keywords.get("backend", "pymunk"),
@@ -115,49 +123,49 @@ def evaluate(
         episodes=episodes,
         success=success,
         success_interval=interval(success, episodes),
-        first_shot=float(tally.first_shot.mean()),
-        returns=float(tally.returns.mean()),
-        returns_iqm=iqm(tally.returns),
-        returns_interval=bootstrap(tally.returns, iqm),
-        length=float(tally.length.mean()),
-        hits=float(tally.hits.mean()),
-        deployability=Deployability.of(
-            tally.violations / max(tally.length.sum(), 1),
-            tally.rms_jerk(),
-            tally.power_above(5.0),
-            _act_ms(world),
-            world.control_dt,
-        ),
+        first_shot=float(statistics.first_shot.mean()),
+        returns=float(statistics.returns.mean()),
+        returns_iqm=iqm(statistics.returns),
+        returns_interval=bootstrap(statistics.returns, iqm),
+        length=float(statistics.length.mean()),
+        hits=float(statistics.hits.mean()),
+        deployability=statistics.deployability(),
     )
     world.close()
     return result
 
 
-class _Tally:
-    """Counts the first episode of every world."""
+class _EpisodeStatistics:
+    """Statistics of the first episode of every world, and of ``paddle_0`` in it.
+
+    Args:
+        world: the worlds, reset.
+    """
 
     def __init__(self, world: World) -> None:
         self.world, b = world, world.num_worlds
         self.done = np.zeros(b, np.bool_)
+        """(B,) True for worlds whose first episode is over"""
         self.success, self.first_shot = np.zeros((2, b), np.bool_)
         self.returns, self.length, self.hits = np.zeros((3, b))
-        self.violations = 0
-        self._jolts: list[Array] = []
+        self._violations = 0
+        self._jerks: list[Array] = []
         self._actions: list[Array] = []
-        self._pushed = np.zeros((b, 2))
-        self._last = np.zeros((b, 2))
+        self._acceleration = np.zeros((b, 2))
+        self._command = np.zeros((b, 2))
 
-    def add(self, step: Any) -> None:
-        """Take the step that was just made."""
+    def add(self, result: StepResult) -> None:
+        """Add the step that was just made."""
         world, live = self.world, ~self.done
         dt = world.control_dt
         self.length += live
-        self.violations += int(((step.violation[:, 0, -1] > 0) & live).sum())
-        pushed = (world.command[:, 0] - self._last) / dt
-        self._jolts.append(((pushed - self._pushed)[live] / dt).ravel())
-        self._pushed, self._last = pushed, world.command[:, 0]
+        self._violations += int(((result.violation[:, 0, -1] > 0) & live).sum())
+        command = world.command[:, 0]
+        acceleration = (command - self._command) / dt
+        self._jerks.append(((acceleration - self._acceleration)[live] / dt).ravel())
+        self._acceleration, self._command = acceleration, command
         self._actions.append(np.where(live[:, None], world.action[:, 0], np.nan))
-        ended = (step.terminated | step.truncated) & live
+        ended = (result.terminated | result.truncated) & live
         episode = world.episode
         self.success[ended] = episode.success[ended, 0]
         self.first_shot[ended] = episode.first_shot[ended]
@@ -166,13 +174,26 @@ class _Tally:
             self.hits[ended] = world.memory["touches"].sum((-1, -2))[ended]
         self.done |= ended
 
-    def rms_jerk(self) -> float:
-        """Root mean square over all axes and steps, m/s3."""
-        jolts = np.concatenate(self._jolts)
-        return float(np.sqrt((jolts**2).mean()))
+    def deployability(self) -> Deployability:
+        """Return the driver's fitness for a real arm."""
+        return Deployability.of(
+            self._violations / max(self.length.sum(), 1),
+            self._rms_jerk(),
+            self._power_above(5.0),
+            _act_ms(self.world),
+            self.world.control_dt,
+        )
 
-    def power_above(self, frequency: float) -> float:
-        """Share of the asked actions' power above a frequency, Hz."""
+    def _rms_jerk(self) -> float:
+        """Return the root mean square of the commands' jerk, m/s3."""
+        jerks = np.concatenate(self._jerks)
+        return float(np.sqrt((jerks**2).mean()))
+
+    def _power_above(self, frequency: float) -> float:
+        """Return the share of the actions' power above a frequency, Hz.
+
+        It is nan if the frequency is not below half of the control rate.
+        """
         dt = self.world.control_dt
         if 0.5 / dt <= frequency:
             return float("nan")
@@ -188,7 +209,7 @@ class _Tally:
 
 
 def _act_ms(world: World) -> float:
-    """Median CPU time of a decision of paddle_0 in a single world, ms."""
+    """Return the median CPU time of a decision of paddle_0 in a single world, ms."""
     seat = world.driven[0]
     view = seat.view(world.sensed, world.memory, world.episode.physics)
     state = view.state.map(lambda x: x[:1])

@@ -1,4 +1,4 @@
-"""Games between players: who wins, by how much, over many games in one batch."""
+"""Games between players: winners and margins of many games in one batch."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from marl_airhockey.world.roster import Roster
 
 
 @dataclass(frozen=True)
-class Outcomes:
-    """How G games of T teams went."""
+class GameResults:
+    """Results of G games of T teams."""
 
     won: Array
-    """(G, T) bool; nobody in a draw"""
+    """(G, T) bool, True for the winner; all False in a draw"""
     margin: Array
-    """(G, T) return of a team's seats: goals for less goals against"""
+    """(G, T) return of a team's seats: goals for minus goals against"""
     seconds: Array
-    """(G,) how long it took"""
+    """(G,) length, s"""
 
     @property
     def score(self) -> Array:
-        """(G, T) 1 for a win, an equal share of 1 for a draw."""
+        """(G, T) points: 1 for a win, an equal share of 1 for a draw."""
         drawn = ~self.won.any(-1, keepdims=True)
         return np.asarray(self.won + drawn / self.won.shape[1])
 
 
 def teams_of(seats: Sequence[int]) -> Array:
-    """(seats,) the number of each seat's team, from 0."""
+    """Return (seats,) the number of each seat's team, from 0 without gaps."""
     return np.unique(np.asarray(seats), return_inverse=True)[1]
 
 
-def challenge(
+def play_against(
     scenario: str,
     player: Driver,
     rivals: Sequence[Driver],
@@ -44,18 +44,18 @@ def challenge(
     seed: int,
     keywords: Keywords | None = None,
 ) -> tuple[Array, Array]:
-    """One player against each of others, who play for all other teams.
+    """Let one player play each of R rivals, who play for all other teams.
 
     Args:
-        scenario: a game.
-        player: it changes ends from game to game.
+        scenario: name of a game.
+        player: driver; it changes ends from game to game.
         rivals: drivers.
-        games: against each.
-        seed: of the first game.
-        keywords: of the environment.
+        games: number of games against each.
+        seed: seed of the first game.
+        keywords: keywords of the environment.
 
     Returns:
-        Its score and its mean margin against each rival, (R,).
+        The player's mean score and mean margin against each rival, (R,) each.
     """
     keywords = keywords or {}
     scene = find_scenario(scenario, keywords).scene
@@ -63,26 +63,26 @@ def challenge(
     rows = np.arange(1, len(rivals) + 1).repeat(games)
     lineups = rows[:, None].repeat(teams, axis=1)
     lineups[np.arange(len(rows)), np.arange(len(rows)) % teams] = 0
-    found = play(scenario, [player, *rivals], lineups, seed, keywords)
-    score, margin = found.score[lineups == 0], found.margin[lineups == 0]
+    results = play_games(scenario, [player, *rivals], lineups, seed, keywords)
+    score, margin = results.score[lineups == 0], results.margin[lineups == 0]
     return score.reshape(-1, games).mean(-1), margin.reshape(-1, games).mean(-1)
 
 
-def play(
+def play_games(
     scenario: str,
     players: Sequence[Driver],
     lineups: Array,
     seed: int,
     keywords: Keywords | None = None,
-) -> Outcomes:
-    """Play games, all at once, to their ends.
+) -> GameResults:
+    """Play G games to their ends, all at once.
 
     Args:
-        scenario: a game.
+        scenario: name of a game.
         players: drivers.
-        lineups: (G, T) which player plays for which team in each game, by number.
-        seed: of the first game; game i has seed + i.
-        keywords: of the environment, see `make.build_world`.
+        lineups: (G, T) number of the player of each team in each game.
+        seed: seed of the first game; game i has seed + i.
+        keywords: keywords of the environment, see `build_world`.
 
     Raises:
         ValueError: a scenario without teams that play each other.
@@ -113,4 +113,4 @@ def play(
         seconds[ended] = world.state.time[ended]
         playing &= ~ended
     world.close()
-    return Outcomes(won, margin, seconds)
+    return GameResults(won, margin, seconds)

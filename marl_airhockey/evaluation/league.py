@@ -1,4 +1,4 @@
-"""A round-robin of players of a game: ratings, a matrix, and who beats whom in turn."""
+"""Round-robin league of players of a game of two teams."""
 
 from __future__ import annotations
 
@@ -9,34 +9,33 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.evaluation.games import Outcomes, play
+from marl_airhockey.evaluation.games import GameResults, play_games
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 
 LEAGUE_SEED = 3_000_000
-
-
+"""Seed of a league's first game"""
 BATCH = 4096
-"""Most games at once."""
+"""Most games in one batch"""
 
 
-def league(
+def play_league(
     scenario: str,
     players: Mapping[str, Driver],
     games: int = 100,
     seed: int = LEAGUE_SEED,
     keywords: Keywords | None = None,
 ) -> Standings:
-    """Let everybody play everybody.
+    """Let every player play every other.
 
     Args:
-        scenario: a game of two teams.
-        players: by name, two at least.
-        games: of each pair; they change ends at half of them.
-        seed: of the first game.
-        keywords: of the environment.
+        scenario: name of a game of two teams.
+        players: drivers by name, two at least.
+        games: number of games of each pair; they change ends at half of them.
+        seed: seed of the first game.
+        keywords: keywords of the environment.
 
     Raises:
         ValueError: a single player, or a scenario that is no game of two teams.
@@ -49,15 +48,15 @@ def league(
     swapped = np.arange(len(lineups)) % games >= games // 2
     lineups[swapped] = lineups[swapped, ::-1]
     parts = [
-        play(scenario, list(players.values()), some, seed + first, keywords)
+        play_games(scenario, list(players.values()), some, seed + first, keywords)
         for first in range(0, len(lineups), BATCH)
         for some in [lineups[first : first + BATCH]]
     ]
-    found = Outcomes(
-        *[np.concatenate(x) for x in zip(*map(_fields, parts), strict=True)]
+    results = GameResults(
+        *[np.concatenate(x) for x in zip(*map(_arrays, parts), strict=True)]
     )
-    # Columns as in `pairs`, whatever the ends.
-    won, margin = found.won, found.margin
+    # Columns in the order of `pairs`, whatever the ends.
+    won, margin = results.won, results.margin
     won[swapped], margin[swapped] = won[swapped, ::-1], margin[swapped, ::-1]
     won = won.reshape(len(pairs), games, 2)
     wins, draws, goals = np.zeros((3, count, count))
@@ -70,11 +69,11 @@ def league(
     return Standings(scenario, names, games, wins, draws, goals, ratings, spread)
 
 
-def found_in(folder: Path) -> list[str]:
-    """Paths of the policies in a folder: runs of `train`, frozen and ONNX files.
+def find_policies(folder: Path) -> list[str]:
+    """Return paths of the policies in a folder: runs of `train`, .npz and .onnx files.
 
     Raises:
-        ValueError: a folder without any.
+        ValueError: a folder without policies.
     """
     runs = [path.parent for path in sorted(folder.rglob("config.toml"))]
     inside = {run for run in runs if (run / "last.zip").exists()}
@@ -90,12 +89,12 @@ def found_in(folder: Path) -> list[str]:
     return found
 
 
-def _fields(found: Outcomes) -> tuple[Array, Array, Array]:
-    return found.won, found.margin, found.seconds
+def _arrays(results: GameResults) -> tuple[Array, Array, Array]:
+    return results.won, results.margin, results.seconds
 
 
 def _rating_intervals(won: Array, pairs: Array, count: int, seed: int) -> Array:
-    """(E, 2) 95 % intervals of ratings, games of each pair being drawn again."""
+    """Return (E, 2) 95 % intervals of ratings, by resampling the games of each pair."""
     rng, games, found = np.random.default_rng(seed), won.shape[1], []
     points = won + 0.5 * ~won.any(-1, keepdims=True)
     a, b = pairs.T

@@ -1,4 +1,4 @@
-"""Recordings of play: files of JSON lines, and how they are read."""
+"""Recordings of play: JSON lines with a meta line, a line per step, and an end."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""How fast environments step: whole env-steps, restarts included, random actions.
+"""Speed of environments: whole env-steps with random actions, resets included.
 
-Rates are per CPU-second of this process and per second of wall time; cases are measured
-in turns, because machines are shared.
+Rates are per CPU-second of this process and per second of wall time. Machines are
+shared: in every round each case is measured once, so that all meet the same load.
 """
 
 from __future__ import annotations
@@ -17,13 +17,15 @@ import numpy as np
 from marl_airhockey.jit.threads import threads
 from marl_airhockey.make import make_world, parallel_env
 
-DRAWN = 64
-"""Different actions, drawn beforehand."""
+NUM_ACTIONS = 64
+"""Number of different actions, drawn beforehand"""
+WARM_UP_STEPS = 100
+"""Steps before the first round: all is compiled then, episodes have spread apart"""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is stepped; ``worlds`` 0 is the PettingZoo environment with its dicts."""
+    """Environment to be measured; 0 ``worlds`` is the PettingZoo dict environment."""
 
     scenario: str
     backend: str
@@ -31,13 +33,13 @@ class Case:
 
     @property
     def name(self) -> str:
-        """For tables."""
+        """Name of the environment in tables."""
         return f"{self.worlds} worlds" if self.worlds else "dict env"
 
 
 @dataclass(frozen=True)
-class Rate:
-    """How fast a case is: medians over the rounds."""
+class StepRate:
+    """Speed of a case: medians over the rounds."""
 
     case: Case
     agents: int
@@ -45,15 +47,15 @@ class Rate:
     env_steps_per_cpu_s: float
     env_steps_per_s: float
     spread: float
-    """Highest less lowest rate per CPU-second, as a share of the median"""
+    """Highest minus lowest rate per CPU-second, as a share of the median"""
 
     @property
     def agent_steps_per_cpu_s(self) -> float:
-        """Every agent's step counts."""
+        """Steps of single agents per CPU-second."""
         return self.env_steps_per_cpu_s * self.agents
 
     def to_json(self) -> dict[str, Any]:
-        """For a report."""
+        """Return case and rates as a JSON object."""
         return {
             "scenario": self.case.scenario,
             "backend": self.case.backend,
@@ -67,23 +69,19 @@ class Rate:
         }
 
 
-WARM = 100
-"""Steps before the first turn: all is compiled then, and episodes are out of step."""
-
-
-def measure(
+def measure_speed(
     cases: Sequence[Case],
     rounds: int = 3,
     seconds: float = 1.0,
     report: Callable[[], None] = lambda: None,
-) -> list[Rate]:
-    """Measure cases in turns.
+) -> list[StepRate]:
+    """Measure cases, each once in every round.
 
     Args:
-        cases: what to step.
-        rounds: turns.
-        seconds: CPU-seconds of a turn of a case.
-        report: called after every turn of a case.
+        cases: environments to measure.
+        rounds: number of rounds.
+        seconds: CPU-seconds of a case in a round.
+        report: called after every measurement.
     """
     runs = [_stepper(case) for case in cases]
     rates: list[list[tuple[float, float]]] = [[] for _ in cases]
@@ -95,12 +93,12 @@ def measure(
     for case, (_, agents), found in zip(cases, runs, rates, strict=True):
         cpu, wall = np.median(found, axis=0).tolist()
         spread = float(np.ptp([c for c, _ in found]) / cpu)
-        out.append(Rate(case, agents, threads(), cpu, wall, spread))
+        out.append(StepRate(case, agents, threads(), cpu, wall, spread))
     return out
 
 
 def _stepper(case: Case) -> tuple[Callable[[], int], int]:
-    """What steps a case a few times and says how many env-steps that were; agents."""
+    """Return a function that makes and counts env-steps, and the agents' number."""
     rng = np.random.default_rng(0)
     if case.worlds == 0:
         env = parallel_env(case.scenario, backend=case.backend)
@@ -108,10 +106,10 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
         agents = env.possible_agents
         rows = [
             {agent: rng.uniform(-1, 1, 2).astype(np.float32) for agent in agents}
-            for _ in range(8 * DRAWN)
+            for _ in range(8 * NUM_ACTIONS)
         ]
 
-        def play() -> int:
+        def step_env() -> int:
             for row in rows:
                 if env.agents:
                     env.step(row)
@@ -119,37 +117,37 @@ def _stepper(case: Case) -> tuple[Callable[[], int], int]:
                     env.reset()
             return len(rows)
 
-        play()
-        return play, len(agents)
+        step_env()
+        return step_env, len(agents)
 
     world = make_world(case.scenario, case.worlds, backend=case.backend)
     world.reset(0)
-    turns = max(1, min(DRAWN, 4096 // case.worlds))
-    drawn = rng.uniform(-1, 1, (DRAWN, case.worlds, len(world.open), 2))
+    calls = max(1, min(NUM_ACTIONS, 4096 // case.worlds))
+    actions = rng.uniform(-1, 1, (NUM_ACTIONS, case.worlds, len(world.open), 2))
     count = 0
 
-    def step() -> int:
+    def step_worlds() -> int:
         nonlocal count
-        for _ in range(turns):
+        for _ in range(calls):
             count += 1
-            world.step(drawn[count % DRAWN])
-        return turns * case.worlds
+            world.step(actions[count % NUM_ACTIONS])
+        return calls * case.worlds
 
-    while count < WARM:
-        step()
-    return step, len(world.open)
+    while count < WARM_UP_STEPS:
+        step_worlds()
+    return step_worlds, len(world.open)
 
 
 def _rate(run: Callable[[], int], seconds: float) -> tuple[float, float]:
-    """Env-steps per CPU-second and per second."""
+    """Return env-steps per CPU-second and per second of wall time."""
     steps, cpu, wall = 0, time.process_time(), time.perf_counter()
     while (spent := time.process_time() - cpu) < seconds:
         steps += run()
     return steps / spent, steps / (time.perf_counter() - wall)
 
 
-def picture(rates: Sequence[Rate], path: Path) -> None:
-    """Env-steps per CPU-second against the number of worlds, a line for each."""
+def plot_speed(rates: Sequence[StepRate], path: Path) -> None:
+    """Draw env-steps per CPU-second against the number of worlds, a line per case."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.evaluation.charts import DPI, save, tidy

@@ -1,4 +1,4 @@
-"""Standings: see the definitions."""
+"""Standings of a league: scores, ratings, table and picture."""
 
 from __future__ import annotations
 
@@ -16,43 +16,43 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class Standings:
-    """Results of E players, each against each."""
+    """Results of E players, each against each other."""
 
     scenario: str
     names: tuple[str, ...]
     games: int
-    """Of each pair, half of them at either end."""
+    """Number of games of each pair, half of them at either end"""
     wins: Array
-    """(E, E) games that the row's player won against the column's"""
+    """(E, E) number of games that the row's player won against the column's"""
     draws: Array
-    """(E, E)"""
+    """(E, E) number of games without a winner"""
     margin: Array
-    """(E, E) mean goals for less goals against"""
+    """(E, E) mean of goals for minus goals against"""
     ratings: Array
-    """(E,) Elo, 1000 on average"""
+    """(E,) Elo ratings, 1000 on average"""
     rating_intervals: Array
-    """(E, 2) 95 %, by resampling games"""
+    """(E, 2) 95 % intervals of the ratings, by resampling games"""
 
     @property
     def score(self) -> Array:
-        """(E, E) share of points, a draw being half a win; nan against oneself."""
+        """(E, E) share of points, a draw being half a win; nan on the diagonal."""
         with np.errstate(invalid="ignore"):
             share = (self.wins + 0.5 * self.draws) / self.played
         return np.asarray(share)
 
     @property
     def played(self) -> Array:
-        """(E, E) games."""
+        """(E, E) number of games."""
         return np.asarray(self.wins + self.wins.T + self.draws)
 
     @property
     def order(self) -> list[int]:
-        """Players, the best first."""
+        """Numbers of the players, the best first."""
         return [int(i) for i in np.argsort(-self.ratings, kind="stable")]
 
     @property
     def circles(self) -> list[tuple[str, str, str]]:
-        """Triples in which each certainly (95 %) beats the next, the last the first."""
+        """Triples in which each beats the next, and the last the first, with 95 %."""
         beats = np.zeros(self.score.shape, np.bool_)
         for a, b in permutations(range(len(self.names)), 2):
             low, _ = interval(float(self.score[a, b]), int(self.played[a, b]))
@@ -65,7 +65,7 @@ class Standings:
         return found
 
     def rows(self) -> list[dict[str, Any]]:
-        """The table, the best first."""
+        """Return the rows of the table, the best player first."""
         wins, draws = self.wins.sum(-1), self.draws.sum(-1)
         losses, others = self.wins.sum(0), len(self.names) - 1
         low, high = self.rating_intervals.T
@@ -85,7 +85,7 @@ class Standings:
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """For a report."""
+        """Return table, scores and circles as a JSON object, the best player first."""
         order = self.order
         return {
             "scenario": self.scenario,
@@ -98,7 +98,7 @@ class Standings:
         }
 
     def to_markdown(self) -> str:
-        """The table and the circles."""
+        """Return the table and the circles as Markdown."""
         lines = [
             f"# League of {self.scenario}: {self.games} games of each pair",
             "",
@@ -115,17 +115,17 @@ class Standings:
         return "\n".join(lines).rstrip() + "\n"
 
     def save(self, folder: Path) -> list[Path]:
-        """Write ``league.json``, ``league.md`` and ``league.png``."""
+        """Write ``league.json``, ``league.md`` and ``league.png``; return them."""
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / f"league.{kind}" for kind in ("json", "md", "png")]
         files[0].write_text(json.dumps(self.to_json(), indent=1))
         files[1].write_text(self.to_markdown())
-        picture(self, files[2])
+        plot_scores(self, files[2])
         return files
 
 
-def picture(standings: Standings, path: Path) -> None:
-    """The matrix of scores, the best player first."""
+def plot_scores(standings: Standings, path: Path) -> None:
+    """Draw the matrix of scores, the best player first."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.evaluation.charts import DPI, save

@@ -1,4 +1,4 @@
-"""Statistics of runs and games: what to report instead of a bare mean."""
+"""Statistics of runs and games: intervals, robust means, ratings."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from marl_airhockey.types import Array
 
 RESAMPLES = 2000
-"""Of a bootstrap."""
+"""Resamples of a bootstrap"""
 
 
 def interval(share: float, n: int) -> tuple[float, float]:
-    """95 % interval of a share of n trials (Wilson, 1927)."""
+    """Return the 95 % interval of a share of n trials (Wilson, 1927)."""
     z = 1.96
     middle = (share + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * np.sqrt(share * (1 - share) / n + (z / (2 * n)) ** 2)
@@ -21,10 +21,13 @@ def interval(share: float, n: int) -> tuple[float, float]:
 
 
 def iqm(values: Array) -> float:
-    """Interquartile mean: that of the middle half, (Agarwal et al., 2021).
+    """Return the interquartile mean, that of the middle half (Agarwal et al., 2021).
 
-    Values at the edges of the middle half count by the part that lies in it, so that it
-    is right for any number of values.
+    Values at the edges of the middle half count by the part that lies in it: right for
+    any number of values.
+
+    Raises:
+        ValueError: no values.
     """
     ordered = np.sort(np.ravel(values)).astype(float)
     n = len(ordered)
@@ -41,13 +44,13 @@ def bootstrap(
     seed: int = 0,
     resamples: int = RESAMPLES,
 ) -> tuple[float, float]:
-    """95 % percentile interval of a statistic.
+    """Return the 95 % percentile interval of a statistic.
 
     Args:
-        values: (runs, ...); runs are drawn with replacement, rows staying together.
-        statistic: of such an array.
-        seed: of the drawing.
-        resamples: how many.
+        values: (runs, ...); runs are drawn with replacement, rows stay whole.
+        statistic: function of such an array.
+        seed: seed of the drawing.
+        resamples: number of resamples.
     """
     rows, rng = np.asarray(values), np.random.default_rng(seed)
     found = [
@@ -58,31 +61,31 @@ def bootstrap(
 
 
 def probability_of_improvement(new: Array, old: Array) -> float:
-    """How likely a run of the one beats a run of the other; a tie counts half.
+    """Return the probability that a new run beats an old one; a tie counts half.
 
     Args:
         new: (n,) results of runs.
-        old: (m,) results of runs.
+        old: (m,) results of runs to compare with.
     """
     gap = np.sign(np.subtract.outer(np.ravel(new), np.ravel(old)))
     return float(0.5 + 0.5 * gap.mean())
 
 
 def elo(score: Array, games: Array) -> Array:
-    """(E,) ratings of E players, 1000 on average, by the model of Bradley and Terry.
+    """Return (E,) Elo ratings of E players, 1000 on average (Bradley and Terry).
 
-    Every player has one more game, drawn with an average one, so that ratings of those
-    who never won or lost stay finite.
+    Every player is given one more game, a draw against an average player, so that the
+    ratings of those who never won or never lost stay finite.
 
     Args:
         score: (E, E) points of the row's player against the column's.
-        games: (E, E) games between them.
+        games: (E, E) number of games between them.
     """
     share = np.ones(len(score))
     won = score.sum(-1) + 0.5
     for _ in range(2000):
-        meet = games / np.add.outer(share, share)
-        new = won / (meet.sum(-1) + 1.0 / (share + 1.0))
+        expected = games / np.add.outer(share, share)
+        new = won / (expected.sum(-1) + 1.0 / (share + 1.0))
         new /= np.exp(np.log(new).mean())
         if np.abs(np.log(new / share)).max() < 1e-9:
             break

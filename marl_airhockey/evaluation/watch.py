@@ -1,4 +1,4 @@
-"""Watch a driver: in a window, or as a video file."""
+"""Episodes of a driver, shown in a window or written as a video."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.evaluation.evaluate import seat_world
+from marl_airhockey.evaluation.evaluate import build_driven_world
 from marl_airhockey.render.renderer import TOP, Renderer
 from marl_airhockey.render.video import write_video
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 
 FINAL_HOLD = 0.7
-"""s: how long a video rests on the last picture of an episode."""
+"""Time, s, for which a video rests on the last picture of an episode"""
 
 
-def film(
+def show_episodes(
     scenario: str | Scenario,
     driver: Driver,
     keywords: Keywords,
@@ -30,24 +30,25 @@ def film(
     seconds: float = float("inf"),
     camera: str = TOP,
 ) -> list[Array]:
-    """Play some episodes with ``driver`` at paddle_0 and show them.
+    """Play some episodes with ``driver`` at ``paddle_0`` and show them.
 
     Args:
-        scenario: its name, or a scenario object.
-        driver: who plays.
-        keywords: of the environment.
-        seed: of the first episode.
-        episodes: how many.
-        video: a .gif or .mp4 to write; None opens a window.
-        width: of the pictures, pixels.
-        seconds: at most this much of each episode.
-        camera: the view: "top", or one of the backend's cameras.
+        scenario: name of the scenario, or a scenario object.
+        driver: driver that plays.
+        keywords: keywords of the environment.
+        seed: seed of the first episode.
+        episodes: number of episodes.
+        video: .gif or .mp4 to write; None opens a window.
+        width: width of the video, pixels.
+        seconds: time after which an episode is cut, s.
+        camera: "top", or one of the backend's cameras.
 
     Returns:
-        The pictures (H, W, 3) uint8; none if they went to a window.
+        The pictures (H, W, 3) uint8 of the video; an empty list for a window.
 
     Raises:
         RuntimeError: there is no screen for a window.
+        ValueError: a video that ends in neither .gif nor .mp4.
     """
     if video is None and not any(
         os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
@@ -55,7 +56,7 @@ def film(
         raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
     if video is not None and video.suffix not in (".gif", ".mp4"):
         raise ValueError(f"video: {video.name!r} must end in .gif or .mp4")
-    world = seat_world(driver, scenario, 1, keywords)
+    world = build_driven_world(driver, scenario, 1, keywords)
     mode = "human" if video is None else "rgb_array"
     title = world.scenario.name.replace("_", " ")
     renderer = Renderer(world, mode, title, camera=camera)
@@ -70,7 +71,7 @@ def film(
             over = bool(step.terminated[0] or step.truncated[0])
             renderer.follow()
             if video is not None:
-                pictures.append(renderer.picture(width))
+                pictures.append(renderer.take_picture(width))
         pictures += pictures[-1:] * round(FINAL_HOLD * fps)
     if video is not None:
         write_video(video, pictures, fps)

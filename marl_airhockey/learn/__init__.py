@@ -1,1 +1,1 @@
-"""Training and evaluating policies."""
+"""Training of policies by PPO, and what becomes of a run."""

@@ -1,4 +1,4 @@
-"""Training configurations: presets per scenario, options on top, saved as resolved."""
+"""Training configurations: a preset for each scenario, options on top, as TOML."""
 
 from __future__ import annotations
 
@@ -14,6 +14,12 @@ from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.registry import make_scenario, scenario_names
 from marl_airhockey.world.build import Keywords
 
+RUN_FORMAT = 2
+"""Format of a run's folder, a number in its ``config.toml``.
+
+Raised whenever classes that a run pickles, or settings that it names, move: runs of
+another format are refused.
+"""
 # Not the goalkeeper as it stands: hardly anything gets past it, so that most games
 # against it are drawn and teach nothing.
 OPPONENTS = (
@@ -36,7 +42,7 @@ MAY_BE_ZERO = (
 
 @dataclass(frozen=True, kw_only=True)
 class TrainConfig:
-    """All that decides a PPO run; its fields are the options of ``--set``.
+    """Settings of a PPO run; the fields are the options of ``--set``.
 
     Raises:
         ValueError: a value that makes no sense, named.
@@ -48,31 +54,31 @@ class TrainConfig:
     profile: str = "ideal"
     observe: str = "velocity"
     options: dict[str, Any] = field(default_factory=dict)
-    """The scenario's own fields."""
+    """Values of the scenario's own fields, by name"""
     drivers: dict[str, str] = field(default_factory=dict)
-    """Drivers of seats that are not learned, by agent."""
+    """Drivers of seats that are not learned, by agent"""
     physics: dict[str, Any] = field(default_factory=dict)
-    """Parameters by name, numbers or ranges."""
+    """Physical parameters, by name: numbers or ranges"""
     engine: str = "sb3"
     """"sb3" in this process, or "rllib" over many."""
     num_env_runners: int = 0
-    """Of rllib: processes that step the worlds; 0 for none besides the learner's."""
+    """Number of processes in which rllib steps worlds; 0 for the learner's"""
 
     init: str = ""
-    """Of sb3: folder of a run of the same size, with whose weights training begins."""
+    """Folder of an sb3 run of the same network size, to begin with its weights"""
 
     total_steps: int
-    """Steps of single worlds, over all of them."""
+    """Steps of single worlds, summed over all worlds"""
     num_worlds: int
     n_steps: int
-    """Steps of each world in a rollout."""
+    """Steps of each world in a rollout"""
     batch_size: int
     n_epochs: int
     learning_rate: float
     highest_rate: float
-    """Up to here the rate is raised while the KL divergence stays low."""
+    """Highest learning rate, to which a low KL divergence raises it"""
     target_kl: float
-    """The rate is halved or so above twice this, raised below half of it."""
+    """KL divergence; the rate is lowered above twice it, raised below half of it"""
     gamma: float
     gae_lambda: float
     clip_range: float
@@ -80,26 +86,26 @@ class TrainConfig:
     max_grad_norm: float
     log_std_init: float
     hidden: list[int]
-    """Widths of the layers of actor and critic, each of its own."""
+    """Widths of the hidden layers; actor and critic share none"""
     evaluations: int
-    """How often the policy is evaluated during training."""
+    """Number of evaluations during training"""
     eval_episodes: int
     torch_threads: int = 1
 
     mirror: float = 0.5
-    """In games: share of the worlds in which the learner plays all seats."""
+    """Share of the worlds of a game in which the learner plays all seats"""
     opponents: list[str] = field(default_factory=lambda: list(OPPONENTS))
-    """In games: drivers that it meets in training."""
+    """Drivers that the learner plays against in games"""
     script_share: float = 0.5
-    """In games: share of the other worlds' games that are against these."""
+    """Share of the other worlds' games that are against `opponents`"""
     snapshots: int = 40
-    """In games: how often the learner is taken into the pool of opponents."""
+    """Number of times that the learner is added to the pool of opponents"""
     pool: int = 16
-    """In games: most snapshots in the pool."""
+    """Most snapshots in the pool"""
     priority: float = 2.0
-    """In games: an opponent is drawn by its share of won games to this power."""
+    """Power of an opponent's share of won games, by which it is drawn"""
     rivals: list[str] = field(default_factory=lambda: list(RIVALS))
-    """In games: drivers that evaluations are against."""
+    """Drivers that evaluations of games are against"""
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -147,7 +153,7 @@ class TrainConfig:
 
     @cached_property
     def self_play(self) -> bool:
-        """Whether seats of more than one team are open: the learner plays them all."""
+        """True if seats of more than one team are open: the learner plays them all."""
         return len(set(self._open_teams)) > 1
 
     @cached_property
@@ -157,7 +163,7 @@ class TrainConfig:
 
     @property
     def slots(self) -> int:
-        """Seats that the learner plays, over all worlds."""
+        """Number of seats that the learner plays, over all worlds."""
         seats, teams = len(self._open_teams), len(set(self._open_teams))
         if teams == 1:
             return self.num_worlds * seats
@@ -166,7 +172,7 @@ class TrainConfig:
 
     @property
     def keywords(self) -> Keywords:
-        """The keywords of the environments."""
+        """Keywords of the environments."""
         return {
             "backend": self.backend,
             "profile": self.profile,
@@ -177,8 +183,8 @@ class TrainConfig:
         }
 
     def to_toml(self) -> str:
-        """The configuration as TOML, readable by `load_config`."""
-        lines, tables = [], []
+        """Return the configuration as TOML, readable by `load_config`."""
+        lines, tables = [f"format = {RUN_FORMAT}"], []
         for name, value in asdict(self).items():
             if isinstance(value, dict):
                 tables.append(f"\n[{name}]")
@@ -197,7 +203,7 @@ def _toml(value: Any) -> str:
 
 
 def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConfig:
-    """The preset of a scenario with changes on top.
+    """Return the preset of a scenario with changes on top.
 
     Raises:
         ValueError: an unknown scenario or field, or a bad value.
@@ -221,9 +227,17 @@ def load_config(path: Path) -> TrainConfig:
     """Read what `TrainConfig.to_toml` wrote.
 
     Raises:
-        ValueError: not such a file.
+        ValueError: not such a file, or one of a run of another format.
     """
     try:
-        return TrainConfig(**tomllib.loads(path.read_text()))
+        data = tomllib.loads(path.read_text())
+        found = data.pop("format", 1)
+        if "scenario" in data and found != RUN_FORMAT:
+            raise ValueError(
+                f"{path.parent}: this run was begun by another version of "
+                f"marl_airhockey (run format {found}, this version reads "
+                f"{RUN_FORMAT}); train it anew in another folder"
+            )
+        return TrainConfig(**data)
     except (OSError, TypeError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path} is no training configuration: {error}") from error

@@ -1,4 +1,4 @@
-"""The demonstration: learn a task, measure it beside others, and show it."""
+"""Demonstration of the library: a task is learned, measured and shown."""
 
 from __future__ import annotations
 
@@ -7,31 +7,35 @@ import json
 import shutil
 from pathlib import Path
 
-from marl_airhockey.evaluation.evaluate import Result, evaluate
-from marl_airhockey.evaluation.watch import film
+from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
+from marl_airhockey.evaluation.watch import show_episodes
 from marl_airhockey.learn.config import preset
-from marl_airhockey.learn.plots import learning_curve
-from marl_airhockey.learn.run import Report
+from marl_airhockey.learn.plots import plot_learning_curve
+from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import train, versions
 from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import load_policy
 
 BESIDE = ("still", "random", "striker")
+"""Agents that the learned policy is compared with"""
 
 
-def run(
-    scenario: str, out: Path, steps: int | None = None, report: Report | None = None
-) -> tuple[list[Result], dict[str, Path]]:
-    """Train, evaluate, and write curve, film and report.
+def run_demo(
+    scenario: str,
+    out: Path,
+    steps: int | None = None,
+    report: ProgressCallback | None = None,
+) -> tuple[list[EvaluationResult], dict[str, Path]]:
+    """Train, evaluate, and write learning curve, video and report.
 
     Args:
-        scenario: what to learn.
-        out: folder; what an earlier demonstration left there is replaced.
-        steps: of single worlds; None for the preset's.
-        report: see `train`.
+        scenario: name of the task to learn.
+        out: folder; an earlier demonstration in it is replaced.
+        steps: steps of single worlds; None for the preset's.
+        report: called during training, see `train`.
 
     Returns:
-        Results of the learned policy and of those beside it, and the files.
+        Results of the learned policy and of `BESIDE`, and the files by name.
     """
     folder = out / "run"
     if folder.exists():
@@ -43,15 +47,17 @@ def run(
     results = [evaluate(d, name, scenario) for name, d in drivers.items()]
     files = {
         "learning curve": out / "learning_curve.png",
-        "film": out / f"{scenario}.gif",
+        "video": out / f"{scenario}.gif",
         "report": out / "report.json",
         "run": folder,
     }
     with (folder / "evaluations.csv").open() as file:
         rows = list(csv.DictReader(file))
     floors = {r.driver: r.success for r in results if r.driver != "learned"}
-    learning_curve(rows, floors, scenario, files["learning curve"])
-    film(scenario, policy, {}, seed=1, video=files["film"], width=560, seconds=10.0)
+    plot_learning_curve(rows, floors, scenario, files["learning curve"])
+    show_episodes(
+        scenario, policy, {}, seed=1, video=files["video"], width=560, seconds=10.0
+    )
     report_data = {
         "scenario": scenario,
         "training": last,

@@ -1,4 +1,4 @@
-"""From a run to one small file with a card: how it came about and how good it is."""
+"""Export of a run's policy as one small file with a card of its origin and quality."""
 
 from __future__ import annotations
 
@@ -12,71 +12,73 @@ from typing import Any
 from stable_baselines3 import PPO
 
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
-from marl_airhockey.learn.network import freeze
+from marl_airhockey.learn.network import to_numpy
 from marl_airhockey.learn.run import Progress
 from marl_airhockey.registry import make_driver, make_scenario
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.toolkit.policies import Policy, frozen_policy
 
 EPISODES = 1000
+"""Episodes by which a task's policy is measured"""
 GAMES = 200
+"""Games against each rival by which a game's policy is measured"""
 
 
-def export(run: Path, out: Path) -> Frozen:
-    """Freeze the last policy of a run and measure it on seeds that it has not seen.
+def export_policy(run: Path, out: Path) -> Frozen:
+    """Write the last policy of a run as .npz, measured on seeds unseen in training.
 
     Args:
-        run: folder of `train`.
+        run: folder of a run of `train`.
         out: the .npz to write.
 
     Raises:
-        ValueError: no run, or a policy that cannot be frozen.
+        ValueError: no run, one of an older version, or a policy that has no numpy form.
     """
     config = load_config(run / "config.toml")
     if not (run / "state.json").exists():
         raise ValueError(f"{run}: there is no policy in it yet; train it first")
-    progress, bare = Progress.load(run / "state.json"), _last(run)
-    policy = frozen_policy(bare, str(run))
-    grades = _games(policy, config) if config.self_play else _episodes(policy, config)
+    progress, last = Progress.load(run / "state.json"), _load_last(run)
+    policy = frozen_policy(last, str(run))
+    metrics = _games(policy, config) if config.self_play else _episodes(policy, config)
     card = {
-        **bare.card,
+        **last.card,
         "version": make_scenario(config.scenario).version,
         "options": config.options,
         "profile": config.profile,
-        "command": command(config),
+        "command": training_command(config),
         "seed": config.seed,
         "steps": progress.steps,
         "cpu_minutes": round(progress.cpu_seconds / 60, 2),
         "date": datetime.date.today().isoformat(),
-        "grades": grades,
+        "grades": metrics,
     }
-    frozen = Frozen(bare.layers, bare.centre, bare.unit, bare.log_std, card)
+    frozen = Frozen(last.layers, last.centre, last.unit, last.log_std, card)
     out.parent.mkdir(parents=True, exist_ok=True)
     frozen.save(out)
     return frozen
 
 
-def _last(run: Path) -> Frozen:
-    """The last policy of a run."""
+def _load_last(run: Path) -> Frozen:
+    """Return the last policy of a run."""
     if (run / "last.npz").exists():
         return Frozen.load(run / "last.npz")
     model = PPO.load(run / "last.zip", device="cpu")
-    return freeze(model, vars(model)["card"])
+    return to_numpy(model, vars(model)["card"])
 
 
 def _episodes(policy: Policy, config: TrainConfig) -> dict[str, Any]:
-    found = evaluate(
+    result = evaluate(
         policy, "frozen", config.scenario, EPISODES, TEST_SEED, config.keywords
     )
-    low, high = found.success_interval
-    return {"success": found.success, "low": low, "high": high, "episodes": EPISODES}
+    low, high = result.success_interval
+    return {"success": result.success, "low": low, "high": high, "episodes": EPISODES}
 
 
 def _games(policy: Policy, config: TrainConfig) -> dict[str, Any]:
-    score, _ = challenge(
+    score, _ = play_against(
         config.scenario,
         policy,
         [make_driver(rival) for rival in config.rivals],
@@ -93,21 +95,28 @@ def _games(policy: Policy, config: TrainConfig) -> dict[str, Any]:
     }
 
 
-def command(config: TrainConfig) -> str:
-    """The line that trains a configuration anew."""
-    usual = preset(config.scenario, {"profile": config.profile, "seed": config.seed})
+def training_command(config: TrainConfig) -> str:
+    """Return the command line that trains a configuration anew."""
+    defaults = preset(config.scenario, {"profile": config.profile, "seed": config.seed})
     words = [f"airhockey train {config.scenario} --seed {config.seed}"]
     if config.profile != "ideal":
         words.append(f"--profile {config.profile}")
     words += [f"--option {k}={v}" for k, v in config.options.items()]
     words += [f"--driver {k}={v}" for k, v in config.drivers.items()]
-    said = {"scenario", "profile", "options", "drivers", "seed"}
+    named = {"scenario", "profile", "options", "drivers", "seed"}
     if not config.self_play:
-        said |= {"mirror", "opponents", "script_share", "snapshots", "pool", "priority"}
-        said |= {"rivals"}
+        named |= {
+            "mirror",
+            "opponents",
+            "script_share",
+            "snapshots",
+            "pool",
+            "priority",
+        }
+        named |= {"rivals"}
     for f in fields(config):
         value = getattr(config, f.name)
-        if f.name not in said and value != getattr(usual, f.name):
+        if f.name not in named and value != getattr(defaults, f.name):
             setting = f"{f.name}={json.dumps(value, separators=(',', ':'))}"
             words.append("--set " + shlex.quote(setting))
     return " ".join(words)

@@ -1,4 +1,4 @@
-"""How good a policy in training is: success at a task, scores against rivals."""
+"""Grading of a policy in training: success at a task, scores in games."""
 
 from __future__ import annotations
 
@@ -6,30 +6,28 @@ from collections.abc import Callable
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.evaluation.games import challenge
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.registry import make_driver
 from marl_airhockey.world.build import Keywords
 
 EVAL_SEED = 1_000_000
-"""First seed of the evaluations during training."""
-Grades = dict[str, float]
-"""Named numbers; the first says how good the policy is, ``return`` breaks ties."""
+"""First seed of the evaluations during training"""
+Metrics = dict[str, float]
+"""Named numbers; the first says how good the policy is, ``return`` breaks ties"""
+DriverFactory = Callable[[bool], Driver]
+"""Maker of the policy as a driver that acts by its mean (True) or samples (False)"""
 
 
-Seat = Callable[[bool], Driver]
-"""The policy as a driver, by its mean (True) or sampling."""
+def grade(make: DriverFactory, config: TrainConfig) -> Metrics:
+    """Evaluate a policy in training on the evaluation seeds."""
+    return _scores(make, config) if config.self_play else _success(make, config)
 
 
-def judge(seat: Seat, config: TrainConfig) -> Grades:
-    """Grade a policy in training on the evaluation seeds."""
-    return _scores(seat, config) if config.self_play else _success(seat, config)
-
-
-def _success(seat: Seat, config: TrainConfig) -> Grades:
+def _success(make: DriverFactory, config: TrainConfig) -> Metrics:
     mean, sampled = (
         evaluate(
-            seat(deterministic),
+            make(deterministic),
             "training",
             config.scenario,
             config.eval_episodes,
@@ -48,18 +46,18 @@ def _success(seat: Seat, config: TrainConfig) -> Grades:
     }
 
 
-def _scores(seat: Seat, config: TrainConfig) -> Grades:
-    """The share of won games, half the draws, against rivals; ends change by turns."""
+def _scores(make: DriverFactory, config: TrainConfig) -> Metrics:
+    """Return shares of won games, a draw counting half; the ends alternate."""
     keywords: Keywords = {**config.keywords, "drivers": {}}
-    score, margin = challenge(
+    score, margin = play_against(
         config.scenario,
-        seat(True),
+        make(True),
         [make_driver(rival) for rival in config.rivals],
         config.eval_episodes,
         EVAL_SEED,
         keywords,
     )
-    grades = {"score": float(score.mean()), "return": float(margin.mean())}
+    metrics = {"score": float(score.mean()), "return": float(margin.mean())}
     for rival, share in zip(config.rivals, score.tolist(), strict=True):
-        grades[f"score/{rival}"] = share
-    return grades
+        metrics[f"score/{rival}"] = share
+    return metrics

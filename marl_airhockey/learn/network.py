@@ -1,4 +1,4 @@
-"""The networks of policies: their fixed input scaling, and how they are frozen."""
+"""Networks of policies: fixed scaling of inputs, conversion to plain arrays."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.config import RUN_FORMAT, TrainConfig
 from marl_airhockey.toolkit.numpy_policy import Frozen
 
 
 class FixedScale(BaseFeaturesExtractor):
-    """``(observation - centre) / unit`` with the typical sizes of the views.
+    """Input layer ``(observation - centre) / unit``, by the observables' typical sizes.
 
     Args:
         observation_space: Box (D,), or the Dict of goals="dict".
@@ -41,7 +41,7 @@ class FixedScale(BaseFeaturesExtractor):
     def forward(
         self, observations: torch.Tensor | dict[str, torch.Tensor]
     ) -> torch.Tensor:
-        """(B, size): the flat part scaled, goals behind it as they are."""
+        """Return (B, size): the flat part scaled, then goals as they are."""
         if isinstance(observations, torch.Tensor):
             return (observations - self.centre) * self.rate
         flat = (observations["observation"] - self.centre) * self.rate
@@ -49,17 +49,18 @@ class FixedScale(BaseFeaturesExtractor):
         return torch.cat([flat, *goals], dim=-1)
 
 
-def card(config: TrainConfig, env: AirHockeyVecEnv) -> dict[str, Any]:
-    """What a policy wants to see: goes with it wherever it is saved."""
+def policy_card(config: TrainConfig, env: AirHockeyVecEnv) -> dict[str, Any]:
+    """Return what a policy must be given to see; saved together with it."""
     return {
+        "run_format": RUN_FORMAT,
         "scenario": config.scenario,
         "observe": config.observe,
         "labels": list(env.world.observer.layout.labels),
     }
 
 
-def freeze(model: PPO, card: Mapping[str, Any]) -> Frozen:
-    """The actor of a model that `ppo.build` made, as plain arrays.
+def to_numpy(model: PPO, card: Mapping[str, Any]) -> Frozen:
+    """Return the actor of a model of `sb3.build_model` as plain arrays.
 
     Raises:
         ValueError: another kind of model: pixels, dict goals, other layers.
@@ -68,17 +69,19 @@ def freeze(model: PPO, card: Mapping[str, Any]) -> Frozen:
     scale, layers = policy.features_extractor, policy.mlp_extractor.policy_net
     kinds = {type(layer) for layer in layers}
     if not isinstance(scale, FixedScale) or kinds - {torch.nn.Linear, torch.nn.ReLU}:
-        raise ValueError("freeze: only policies on flat observations with ReLU layers")
-    return frozen([*layers, policy.action_net], scale, policy.log_std, card)
+        raise ValueError(
+            "to_numpy: only policies on flat observations with ReLU layers"
+        )
+    return layers_to_numpy([*layers, policy.action_net], scale, policy.log_std, card)
 
 
-def frozen(
+def layers_to_numpy(
     layers: Iterable[torch.nn.Module],
     scale: FixedScale,
     log_std: torch.Tensor,
     card: Mapping[str, Any],
 ) -> Frozen:
-    """Linear layers (what lies between them is rectifiers) as plain arrays."""
+    """Return linear layers, with rectifiers between them, as plain arrays."""
 
     def array(tensor: torch.Tensor) -> Any:
         return tensor.detach().cpu().numpy().astype(np.float32).copy()

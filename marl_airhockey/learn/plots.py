@@ -8,22 +8,22 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, PALE, curve, save, tidy
+from marl_airhockey.evaluation.charts import DPI, INK, INKS, PALE, plot_iqm, save, tidy
 
 
-def learning_curve(
+def plot_learning_curve(
     rows: Sequence[Mapping[str, str]],
     floors: Mapping[str, float],
     title: str,
     path: Path,
 ) -> None:
-    """Success against CPU-seconds of training, with others' success as lines.
+    """Draw success against CPU-seconds of training, others' success as lines.
 
     Args:
-        rows: of ``evaluations.csv``.
+        rows: rows of ``evaluations.csv``.
         floors: success of other drivers, by name.
-        title: of the plot.
-        path: of the PNG.
+        title: title of the plot.
+        path: PNG to write.
     """
     figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
     cpu = [0.0, *(float(row["cpu_seconds"]) for row in rows)]
@@ -46,14 +46,14 @@ def learning_curve(
     save(figure, path)
 
 
-def seed_curves(
+def plot_seed_curves(
     runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]], path: Path
 ) -> None:
-    """Success against CPU-seconds, a panel for each task, as `charts.curve` draws it.
+    """Draw success against CPU-seconds, a panel for each task, by `charts.plot_iqm`.
 
     Args:
-        runs: for each task, the rows of ``evaluations.csv`` of each seed.
-        path: of the PNG.
+        runs: rows of ``evaluations.csv`` of each seed, by task.
+        path: PNG to write.
     """
     across = min(5, len(runs))
     down = -(-len(runs) // across)
@@ -76,7 +76,7 @@ def seed_curves(
         cpu = np.mean(
             [[float(row["cpu_seconds"]) for row in rows[:length]] for rows in seeds], 0
         )
-        curve(axes, cpu, share, INK)
+        plot_iqm(axes, cpu, share, INK)
         axes.axhline(0.95, color=INKS[0], linestyle=":", linewidth=1)
         axes.set(title=name.replace("_", " "), ylim=(-0.03, 1.03), xlim=(0, None))
         tidy(axes, legend=None)

@@ -1,9 +1,9 @@
-"""The engine "rllib": PPO of Ray, with worlds stepped in as many processes as wanted.
+"""Engine "rllib": PPO of Ray, with worlds stepped in any number of processes.
 
-On a local Ray, or on the cluster that ``RAY_ADDRESS`` names. Each env runner steps its
-share of the worlds as one batch and hands over an episode chunk for each of its seats.
-Unlike with the engine "sb3", the learning rate fades on a fixed schedule and every
-runner has its own pool of past selves.
+It runs on a local Ray, or on the cluster that ``RAY_ADDRESS`` names. Each env runner
+steps its share of the worlds as one batch and returns an episode chunk for each of its
+slots. Unlike in the engine "sb3", the learning rate fades on a fixed schedule and every
+runner has its own pool of the learner's snapshots.
 """
 
 from __future__ import annotations
@@ -21,25 +21,31 @@ from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Grades, judge
-from marl_airhockey.learn.network import card
+from marl_airhockey.learn.grade import Metrics, grade
+from marl_airhockey.learn.network import policy_card
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU, ActorCritic, BatchRunner
-from marl_airhockey.learn.run import Ledger
-from marl_airhockey.learn.self_play import environment
+from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.toolkit.policies import frozen_policy
 
 
-def algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:
-    """RLlib's PPO for a configuration; Ray must run."""
-    probe = environment(config, 1 if not config.self_play else 2, folder / "pool")
+def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:
+    """Build RLlib's PPO for a configuration; Ray must run.
+
+    Args:
+        config: configuration of the run.
+        folder: folder of the run.
+        begun: True if the run is resumed: worlds then get other seeds.
+    """
+    probe = make_training_env(config, 1 if not config.self_play else 2, folder / "pool")
     layout = probe.world.observer.layout
     model = {
         "centre": layout.centre.tolist(),
         "unit": layout.unit.tolist(),
         "hidden": config.hidden,
         "log_std_init": config.log_std_init,
-        "card": card(config, probe),
+        "card": policy_card(config, probe),
     }
     probe.close()
     rate = config.learning_rate
@@ -76,7 +82,7 @@ def algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:
 
 
 def start_ray(runners: int) -> None:
-    """Join the cluster of ``RAY_ADDRESS``, or start a small Ray of our own."""
+    """Join the cluster of ``RAY_ADDRESS``, or start a small local Ray."""
     if ray.is_initialized():
         return
     if "RAY_ADDRESS" in os.environ:
@@ -85,7 +91,7 @@ def start_ray(runners: int) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     ray.init(
         address="local",
-        # A runner counts as one; they may be more than there are cores.
+        # Each runner counts as a CPU; there may be more of them than cores.
         num_cpus=max(os.cpu_count() or 1, runners + 1),
         include_dashboard=False,
         object_store_memory=400_000_000,
@@ -95,47 +101,50 @@ def start_ray(runners: int) -> None:
     )
 
 
-def _checkpoint(ledger: Ledger) -> Path:
-    """Of the steps that ``state.json`` tells of; others are leftovers of a kill."""
-    return (ledger.folder / f"checkpoint-{ledger.progress.steps:012d}").resolve()
+def _algorithm_state(run: TrainingRun) -> Path:
+    """Return the folder of the algorithm's state at the steps of ``state.json``.
+
+    Folders of other steps are leftovers of a killed process.
+    """
+    return (run.folder / f"rllib-{run.progress.steps:012d}").resolve()
 
 
-def learn(ledger: Ledger) -> Grades:
-    """Train to the end of a run, from where it stands."""
-    config, folder, progress = ledger.config, ledger.folder, ledger.progress
+def train_with_rllib(run: TrainingRun) -> Metrics:
+    """Train a run from where it stands to its end; return the last evaluation."""
+    config, folder, progress = run.config, run.folder, run.progress
     torch.set_num_threads(config.torch_threads)
     start_ray(config.num_env_runners)
-    algo = algorithm(config, folder, begun=progress.steps > 0)
+    algo = build_algorithm(config, folder, begun=progress.steps > 0)
     if progress.steps:
-        algo.restore_from_path(_checkpoint(ledger))
+        algo.restore_from_path(_algorithm_state(run))
 
     def policy() -> Frozen:
         module: ActorCritic = algo.get_module(DEFAULT_MODULE_ID)
-        return module.freeze()
+        return module.to_numpy()
 
-    def keep(name: str) -> None:
+    def save(name: str) -> None:
         policy().save(folder / f"{name}.npz")
 
-    def evaluate() -> Grades:
+    def evaluate() -> Metrics:
         now = policy()
-        grades = judge(lambda mean: frozen_policy(now, "training", mean), config)
-        older = list(folder.glob("checkpoint-*"))
-        algo.save_to_path(_checkpoint(ledger))
-        row = ledger.record(grades, keep)
+        metrics = grade(lambda mean: frozen_policy(now, "training", mean), config)
+        older = list(folder.glob("rllib-*"))
+        algo.save_to_path(_algorithm_state(run))
+        row = run.record_evaluation(metrics, save)
         for path in older:
             shutil.rmtree(path)
         if config.self_play:
-            now.save(ledger.milestone)
+            now.save(run.checkpoint_path)
         return row
 
-    row: Grades = {}
+    row: Metrics = {}
     try:
-        while ledger.left > 0:
+        while run.steps_left > 0:
             sampled = algo.train().get("env_runners", {})
             steps = progress.steps + int(sampled.get("num_env_steps_sampled", 0))
             cpu = float(sampled.get(RUNNER_CPU, 0.0)) if config.num_env_runners else 0.0
-            ledger.account(steps, config.learning_rate, cpu)
-            if ledger.due or ledger.left <= 0:
+            run.update_progress(steps, config.learning_rate, cpu)
+            if run.evaluation_due or run.steps_left <= 0:
                 row = evaluate()
     finally:
         algo.stop()

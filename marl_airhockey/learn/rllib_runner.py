@@ -1,4 +1,4 @@
-"""What the engine "rllib" has of its own: the networks, and a runner of many worlds."""
+"""Networks and env runner of the engine "rllib"."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ from ray.rllib.env.single_agent_episode import SingleAgentEpisode
 from ray.rllib.env.utils.infinite_lookback_buffer import InfiniteLookbackBuffer
 
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.network import FixedScale, frozen
-from marl_airhockey.learn.self_play import Arena, environment
+from marl_airhockey.learn.network import FixedScale, layers_to_numpy
+from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.types import Array
 
 RUNNER_CPU = "runner_cpu_seconds"
+"""Name of the metric: CPU time of the env runners, s"""
 
 
 class ActorCritic(TorchRLModule, ValueFunctionAPI):
-    """The networks of the engine "sb3": fixed scaling, two towers, one deviation."""
+    """Networks as in the engine "sb3": fixed scaling, two towers, one deviation."""
 
     def setup(self) -> None:
         settings, space = self.model_config, self.observation_space
@@ -52,13 +53,15 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
     get_exploration_action_dist_cls = get_train_action_dist_cls
     get_inference_action_dist_cls = get_train_action_dist_cls
 
-    def freeze(self) -> Frozen:
-        """The actor as plain arrays."""
-        return frozen(self.actor, self.scale, self.log_std, self.model_config["card"])
+    def to_numpy(self) -> Frozen:
+        """Return the actor as plain arrays."""
+        return layers_to_numpy(
+            self.actor, self.scale, self.log_std, self.model_config["card"]
+        )
 
 
 def _tower(sizes: list[int], out: int, gain: float) -> torch.nn.Sequential:
-    """Rectified layers, initialised as stable-baselines3 does."""
+    """Return rectified layers, initialised as stable-baselines3 does."""
     layers: list[torch.nn.Module] = []
     for i, (a, b) in enumerate(zip(sizes, [*sizes[1:], out], strict=True)):
         last = i == len(sizes) - 1
@@ -70,16 +73,18 @@ def _tower(sizes: list[int], out: int, gain: float) -> torch.nn.Sequential:
 
 
 class BatchRunner(SingleAgentEnvRunner):
-    """Steps a batch of worlds; each slot of it gives chunks of episodes."""
+    """Env runner that steps a batch of worlds; each slot gives chunks of episodes."""
 
     def make_env(self) -> None:
         settings = self.config.env_config
         self._train: TrainConfig = settings["train"]
         shares = max(self.num_workers or 0, 1)
         pool = Path(settings["folder"]) / f"pool-{self.worker_index or 0}"
-        self.env = environment(self._train, self._train.num_worlds // shares, pool)
+        self.env = make_training_env(
+            self._train, self._train.num_worlds // shares, pool
+        )
         self.num_envs = self.env.num_envs
-        # A runner that takes the place of a lost one plays other games than it did.
+        # A runner that replaces a lost one must not repeat its episodes.
         self.env.seed(time.time_ns() % 2**31 if settings["begun"] else self._seed)
         self._seen: Array = self.env.reset()
         self._shares, self._own_steps, self._due = shares, 0, 0
@@ -90,7 +95,7 @@ class BatchRunner(SingleAgentEnvRunner):
         return {DEFAULT_MODULE_ID: (self.env.observation_space, self.env.action_space)}
 
     def sample(self, **_: Any) -> list[SingleAgentEpisode]:
-        """Play ``n_steps`` steps of all worlds."""
+        """Step all worlds ``n_steps`` times and return the episodes' chunks."""
         cpu = time.process_time()
         self._take_snapshot()
         steps, slots = self._train.n_steps, self.num_envs
@@ -106,9 +111,10 @@ class BatchRunner(SingleAgentEnvRunner):
                 batch = {Columns.OBS: torch.from_numpy(seen[t])}
                 out = self.module.forward_exploration(batch)
                 inputs = out[Columns.ACTION_DIST_INPUTS]
-                law = TorchDiagGaussian.from_logits(inputs)
-                action = law.sample()
-                logp[t], parameters[t] = law.logp(action).numpy(), inputs.numpy()
+                distribution = TorchDiagGaussian.from_logits(inputs)
+                action = distribution.sample()
+                logp[t] = distribution.logp(action).numpy()
+                parameters[t] = inputs.numpy()
             chosen[t] = action.numpy()
             self.env.step_async(np.clip(chosen[t], -1.0, 1.0))
             self._seen, reward[t], done[t], infos = self.env.step_wait()
@@ -136,18 +142,18 @@ class BatchRunner(SingleAgentEnvRunner):
                         final,
                     )
                 )
-        self._note(finals, time.process_time() - cpu)
+        self._log(finals, time.process_time() - cpu)
         return episodes
 
     def _take_snapshot(self) -> None:
-        """Take the policy as it is into this runner's pool when it is time."""
+        """Add the policy as it is to this runner's pool of opponents if it is due."""
         steps = max(self._own_steps * self._shares, self.num_env_steps_sampled_lifetime)
-        if isinstance(self.env, Arena) and steps >= self._due:
-            self.env.snapshot(self.module.freeze(), steps)
+        if isinstance(self.env, SelfPlayVecEnv) and steps >= self._due:
+            self.env.snapshot(self.module.to_numpy(), steps)
             every = self._train.total_steps // self._train.snapshots
             self._due = (steps // every + 1) * every
 
-    def _note(self, finals: dict[Any, dict[str, Any]], cpu: float) -> None:
+    def _log(self, finals: dict[Any, dict[str, Any]], cpu: float) -> None:
         steps = self._train.n_steps * self.num_envs
         self._own_steps += steps
         self.num_env_steps_sampled_lifetime += steps
@@ -164,15 +170,15 @@ def _chunk(
     columns: dict[str, Array],
     final: dict[str, Any] | None,
 ) -> SingleAgentEpisode:
-    """A piece of an episode, to its end if ``final`` says how it ended."""
-    cut_off = final is not None and final["TimeLimit.truncated"]
+    """Return a chunk of an episode, ended if its last info ``final`` is given."""
+    truncated = final is not None and final["TimeLimit.truncated"]
     return SingleAgentEpisode(
         observations=InfiniteLookbackBuffer(seen),
         infos=InfiniteLookbackBuffer([{}] * len(seen)),
         actions=InfiniteLookbackBuffer(chosen),
         rewards=InfiniteLookbackBuffer(reward),
         extra_model_outputs={k: InfiniteLookbackBuffer(v) for k, v in columns.items()},
-        terminated=final is not None and not cut_off,
-        truncated=cut_off,
+        terminated=final is not None and not truncated,
+        truncated=truncated,
         len_lookback_buffer=0,
     )

@@ -1,4 +1,4 @@
-"""The folder of a run: where it stands, its evaluations, its best and last policy."""
+"""Folder of a training run: its progress, evaluations, best and last policy."""
 
 from __future__ import annotations
 
@@ -10,80 +10,81 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Grades
+from marl_airhockey.learn.grade import Metrics
 
-Report = Callable[[int, int, Grades], None]
-"""Called with steps done, steps in all, and the newest evaluation."""
+ProgressCallback = Callable[[int, int, Metrics], None]
+"""Function called with steps done, steps in all, and the latest evaluation"""
 
 
 @dataclass
 class Progress:
-    """Where a run stands; ``state.json``."""
+    """Progress of a run, the content of ``state.json``."""
 
     steps: int = 0
     cpu_seconds: float = 0.0
     wall_seconds: float = 0.0
     rate: float = 0.0
     best: tuple[float, float] = (-1.0, float("-inf"))
-    """Success and return of the best evaluation."""
+    """First metric and return of the best evaluation"""
 
     def save(self, path: Path) -> None:
-        """Write it so that a kill leaves the old or the new one."""
+        """Write the file such that a killed process leaves the old or the new one."""
         draft = path.with_suffix(".part")
         draft.write_text(json.dumps(self.__dict__))
         draft.replace(path)
 
     @staticmethod
     def load(path: Path) -> Progress:
-        """Read it."""
+        """Read what `save` wrote."""
         data = json.loads(path.read_text())
         return Progress(**{**data, "best": tuple(data["best"])})
 
 
-class Ledger:
-    """Keeps the folder of a run up to date, whatever engine trains.
+class TrainingRun:
+    """Folder of a run, kept up to date whatever engine trains.
 
     Args:
-        config: of the run.
-        folder: of the run.
-        report: called as training goes on.
+        config: configuration of the run.
+        folder: folder of the run; what is there already is continued.
+        report: called during training.
     """
 
     def __init__(
-        self, config: TrainConfig, folder: Path, report: Report | None = None
+        self, config: TrainConfig, folder: Path, report: ProgressCallback | None = None
     ) -> None:
         self.config, self.folder, self._report = config, folder, report
         state = folder / "state.json"
         self.progress = Progress.load(state) if state.exists() else Progress()
-        self.row: Grades = {}
+        self.latest: Metrics = {}
+        """Last row of ``evaluations.csv``"""
         self._every = max(config.total_steps // config.evaluations, 1)
         self._next = (self.progress.steps // self._every + 1) * self._every
         self._table = folder / "evaluations.csv"
         if self._table.exists():
             with self._table.open() as file:
                 *_, last = csv.DictReader(file)
-            self.row = {name: float(value) for name, value in last.items()}
+            self.latest = {name: float(value) for name, value in last.items()}
         self._start_clock()
 
     @property
-    def left(self) -> int:
-        """Steps that are still to be made."""
+    def steps_left(self) -> int:
+        """Number of steps still to be made."""
         return self.config.total_steps - self.progress.steps
 
     @property
-    def due(self) -> bool:
-        """Whether it is time for an evaluation."""
+    def evaluation_due(self) -> bool:
+        """True if it is time for an evaluation."""
         return self.progress.steps >= self._next
 
     def _start_clock(self) -> None:
         self._clock = (time.process_time(), time.perf_counter())
 
-    def account(self, steps: int, rate: float, elsewhere: float = 0.0) -> None:
-        """Note steps done so far and the time they took; report it.
+    def update_progress(self, steps: int, rate: float, elsewhere: float = 0.0) -> None:
+        """Set the steps done, add the time since the last call, and report both.
 
         Args:
-            steps: from the beginning of the run.
-            rate: of learning, to go on with.
+            steps: steps since the beginning of the run.
+            rate: learning rate now, with which a resumed run continues.
             elsewhere: CPU time of other processes since the last call, s.
         """
         progress, began = self.progress, self._clock
@@ -92,16 +93,18 @@ class Ledger:
         progress.wall_seconds += self._clock[1] - began[1]
         progress.steps, progress.rate = steps, rate
         if self._report is not None:
-            self._report(steps, self.config.total_steps, self.row)
+            self._report(steps, self.config.total_steps, self.latest)
 
-    def record(self, grades: Grades, save: Callable[[str], None]) -> Grades:
-        """Add an evaluation, keep the policy, and save where the run stands.
+    def record_evaluation(
+        self, metrics: Metrics, save: Callable[[str], None]
+    ) -> Metrics:
+        """Add a row to ``evaluations.csv``, save policy and progress; return the row.
 
-        The time since the last `account` does not count as training.
+        The time since the last `update_progress` does not count as training.
 
         Args:
-            grades: of the policy as it is.
-            save: writes the policy under a name, "best" or "last".
+            metrics: evaluation of the policy as it is.
+            save: function that writes the policy under a name, "best" or "last".
         """
         progress = self.progress
         clock = {
@@ -109,14 +112,14 @@ class Ledger:
             "cpu_seconds": progress.cpu_seconds,
             "wall_seconds": progress.wall_seconds,
         }
-        self.row = {**clock, **grades}
+        self.latest = {**clock, **metrics}
         fresh = not self._table.exists()
         with self._table.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(self.row))
+            writer = csv.DictWriter(file, list(self.latest))
             if fresh:
                 writer.writeheader()
-            writer.writerow(self.row)
-        score = (next(iter(grades.values())), grades["return"])
+            writer.writerow(self.latest)
+        score = (next(iter(metrics.values())), metrics["return"])
         if score > tuple(progress.best):
             progress.best = score
             save("best")
@@ -124,11 +127,11 @@ class Ledger:
         progress.save(self.folder / "state.json")
         self._next = (progress.steps // self._every + 1) * self._every
         self._start_clock()
-        return self.row
+        return self.latest
 
     @property
-    def milestone(self) -> Path:
-        """Where the policy of now is kept beside earlier ones."""
-        past = self.folder / "milestones"
-        past.mkdir(exist_ok=True)
-        return past / f"{self.progress.steps:012d}.npz"
+    def checkpoint_path(self) -> Path:
+        """Path of the policy's checkpoint at the present steps; its folder is made."""
+        folder = self.folder / "checkpoints"
+        folder.mkdir(exist_ok=True)
+        return folder / f"{self.progress.steps:012d}.npz"

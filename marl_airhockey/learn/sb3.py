@@ -1,4 +1,4 @@
-"""The engine "sb3": PPO of stable-baselines3 over B worlds in one process."""
+"""Engine "sb3": PPO of stable-baselines3 over B worlds in one process."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from stable_baselines3.common.logger import (
 )
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Grades
-from marl_airhockey.learn.network import FixedScale, card
-from marl_airhockey.learn.run import Ledger
-from marl_airhockey.learn.sb3_callback import Keeper, Rate
-from marl_airhockey.learn.self_play import environment
+from marl_airhockey.learn.config import TrainConfig, load_config
+from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.network import FixedScale, policy_card
+from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.learn.sb3_callback import AdaptiveRate, TrainingCallback
+from marl_airhockey.learn.self_play import make_training_env
 
 
-def learn(ledger: Ledger) -> Grades:
-    """Train to the end of a run, from where it stands."""
-    config, folder, progress = ledger.config, ledger.folder, ledger.progress
+def train_with_sb3(run: TrainingRun) -> Metrics:
+    """Train a run from where it stands to its end; return the last evaluation."""
+    config, folder, progress = run.config, run.folder, run.progress
     torch.set_num_threads(config.torch_threads)
     torch.set_flush_denormal(True)
-    rate = Rate(config, progress.rate or config.learning_rate)
-    env = environment(config, config.num_worlds, folder / "pool")
+    rate = AdaptiveRate(config, progress.rate or config.learning_rate)
+    env = make_training_env(config, config.num_worlds, folder / "pool")
     if progress.steps:
         model = PPO.load(folder / "last.zip", env, device="cpu")
         model.learning_rate = model.lr_schedule = rate
     else:
-        model = build(config, env, rate)
+        model = build_model(config, env, rate)
         if config.init:
             _take_weights(model, Path(config.init))
-    # Other worlds than those before the cut.
+    # A resumed run must not repeat the episodes of its beginning.
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(_logger(folder, progress.steps))
-    keeper = Keeper(ledger, rate)
+    callback = TrainingCallback(run, rate)
     fresh = progress.steps == 0
-    model.learn(ledger.left, callback=keeper, reset_num_timesteps=fresh)
-    row = keeper.checkpoint()
+    model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
+    row = callback.evaluate()
     model.logger.dump(progress.steps)
     model.logger.close()
     env.close()
@@ -49,22 +49,24 @@ def learn(ledger: Ledger) -> Grades:
 
 
 def _logger(folder: Path, steps: int) -> Logger:
-    """CSV and tensorboard; a resumed run begins another CSV, none is overwritten."""
+    """Return a logger to CSV and tensorboard; a resumed run begins another CSV."""
     name = f"progress-{steps}.csv" if steps else "progress.csv"
     table = CSVOutputFormat(str(folder / name))
     return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
 
 
 def _take_weights(model: PPO, run: Path) -> None:
-    """Begin with the weights of a run, its exploration among them.
+    """Load the weights of a run into a model, its exploration among them.
 
     Raises:
-        ValueError: no run, or one of another size.
+        ValueError: no run, one of an older version, or one of another size.
     """
     kept = [run / f"{name}.zip" for name in ("best", "last")]
     path = next((file for file in kept if file.exists()), None)
     if path is None:
         raise ValueError(f"init: {run} is no folder of a run of sb3")
+    if (run / "config.toml").exists():
+        load_config(run / "config.toml")
     weights = PPO.load(path, device="cpu").policy.state_dict()
     try:
         model.policy.load_state_dict(weights)
@@ -72,8 +74,8 @@ def _take_weights(model: PPO, run: Path) -> None:
         raise ValueError(f"init: {run} has another size: {error}") from error
 
 
-def build(config: TrainConfig, env: AirHockeyVecEnv, rate: Rate) -> PPO:
-    """A fresh PPO model for an environment."""
+def build_model(config: TrainConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -> PPO:
+    """Build a fresh PPO model for an environment, with its card as ``model.card``."""
     layout = env.world.observer.layout
     policy, extra = "MlpPolicy", {}
     if config.observe == "pixels":
@@ -109,6 +111,6 @@ def build(config: TrainConfig, env: AirHockeyVecEnv, rate: Rate) -> PPO:
             **extra,
         },
     )
-    # Saved with the model, so that the file alone says what it wants to see.
-    vars(model)["card"] = card(config, env)
+    # SB3 saves it with the model: the file alone says what the policy must see.
+    vars(model)["card"] = policy_card(config, env)
     return model

@@ -1,4 +1,4 @@
-"""What goes on beside the learning of stable-baselines3: rate, logs, checkpoints."""
+"""Callback of stable-baselines3: learning rate, logs, evaluations, checkpoints."""
 
 from __future__ import annotations
 
@@ -10,31 +10,34 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Grades, judge
-from marl_airhockey.learn.network import freeze
-from marl_airhockey.learn.run import Ledger
-from marl_airhockey.learn.self_play import Arena
+from marl_airhockey.learn.grade import Metrics, grade
+from marl_airhockey.learn.network import to_numpy
+from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.learn.self_play import SelfPlayVecEnv
 from marl_airhockey.toolkit.numpy_policy import Frozen
 from marl_airhockey.toolkit.policies import Policy
 
 
-class Rate:
-    """Learning rate that follows the KL divergence and fades to a tenth.
+class AdaptiveRate:
+    """Learning rate that follows the KL divergence of updates and fades to a tenth.
 
-    The divergence of an update should lie near its target: above twice of it the rate
-    is divided by 1.5, below half of it multiplied (after Schulman et al., 2017, who
-    adapt their penalty so).
+    Above twice the target divergence the rate is divided by 1.5, below half of it
+    multiplied by 1.5 (after Schulman et al., 2017, who adapt their penalty so).
+
+    Args:
+        config: configuration of the run; gives the target and the rate's bounds.
+        rate: first rate.
     """
 
     def __init__(self, config: TrainConfig, rate: float) -> None:
         self.rate, self._config = rate, config
 
     def __call__(self, remaining: float) -> float:
-        """The rate when a share ``remaining`` of the training is left."""
+        """Return the rate when a share ``remaining`` (1 to 0) of training is left."""
         return self.rate * (0.1 + 0.9 * remaining)
 
     def adapt(self, divergence: float) -> None:
-        """Take the divergence of the last update."""
+        """Adapt the rate to the divergence of the last update."""
         config = self._config
         if divergence > 2 * config.target_kl:
             self.rate = max(self.rate / 1.5, 0.03 * config.learning_rate)
@@ -42,23 +45,28 @@ class Rate:
             self.rate = min(self.rate * 1.5, config.highest_rate)
 
 
-class Keeper(BaseCallback):
-    """Has the policy judged and kept, and logs, as training goes on."""
+class TrainingCallback(BaseCallback):
+    """Callback that logs, evaluates and saves the policy during training.
 
-    def __init__(self, ledger: Ledger, rate: Rate) -> None:
+    Args:
+        run: run whose folder is kept up to date.
+        rate: learning rate of the model.
+    """
+
+    def __init__(self, run: TrainingRun, rate: AdaptiveRate) -> None:
         super().__init__()
-        self.ledger, self.rate = ledger, rate
-        # The first one at once: there must be somebody to play against.
-        self._due = ledger.progress.steps
+        self.run, self.rate = run, rate
+        # The first snapshot is due at once: self-play needs an opponent.
+        self._snapshot_due = run.progress.steps
 
-    def _freeze(self) -> Frozen:
-        """The policy as it is."""
+    def _to_numpy(self) -> Frozen:
+        """Return the policy as it is."""
         assert isinstance(self.model, PPO)
-        return freeze(self.model, self.card)
+        return to_numpy(self.model, self.card)
 
     @property
     def card(self) -> dict[str, Any]:
-        """What the policy is, as saved with it."""
+        """Description of the policy, saved with it."""
         return {**vars(self.model)["card"], "steps": self.num_timesteps}
 
     def _on_step(self) -> bool:
@@ -66,7 +74,7 @@ class Keeper(BaseCallback):
         assert isinstance(env, AirHockeyVecEnv)
         for name, value in env.last_terms.items():
             self.logger.record_mean(f"reward/{name}", value)
-        if isinstance(env, Arena):
+        if isinstance(env, SelfPlayVecEnv):
             for name, value in env.scores.items():
                 self.logger.record(f"score/{name}", value)
         return True
@@ -75,40 +83,38 @@ class Keeper(BaseCallback):
         divergence = self.logger.name_to_value.get("train/approx_kl")
         if divergence is not None:
             self.rate.adapt(float(divergence))
-        self._account()
-        if self.ledger.due:
-            self.checkpoint()
-        env, config = self.training_env, self.ledger.config
-        if isinstance(env, Arena) and self.num_timesteps >= self._due:
-            env.snapshot(self._freeze(), self.num_timesteps)
-            self._due += config.total_steps // config.snapshots
+        self._update_progress()
+        if self.run.evaluation_due:
+            self.evaluate()
+        env, config = self.training_env, self.run.config
+        if isinstance(env, SelfPlayVecEnv) and self.num_timesteps >= self._snapshot_due:
+            env.snapshot(self._to_numpy(), self.num_timesteps)
+            self._snapshot_due += config.total_steps // config.snapshots
 
-    def _account(self) -> None:
-        self.ledger.account(self.num_timesteps, self.rate.rate)
+    def _update_progress(self) -> None:
+        self.run.update_progress(self.num_timesteps, self.rate.rate)
 
-    def checkpoint(self) -> Grades:
-        """Evaluate, and keep the policy if it is the best."""
-        self._account()
-        ledger, model = self.ledger, self.model
+    def evaluate(self) -> Metrics:
+        """Evaluate and save the policy; return the evaluation's row."""
+        self._update_progress()
+        run, model = self.run, self.model
         predict = partial(_predict, model)
         shape = model.observation_space.shape
-        grades = judge(
-            lambda mean: Policy(
-                predict, shape, ledger.config.observe, "training", mean
-            ),
-            ledger.config,
+        metrics = grade(
+            lambda mean: Policy(predict, shape, run.config.observe, "training", mean),
+            run.config,
         )
-        for name, value in grades.items():
+        for name, value in metrics.items():
             self.logger.record(f"eval/{name}", value)
-        row = ledger.record(grades, self._save)
-        if ledger.config.self_play:
-            self._freeze().save(ledger.milestone)
+        row = run.record_evaluation(metrics, self._save)
+        if run.config.self_play:
+            self._to_numpy().save(run.checkpoint_path)
         return row
 
     def _save(self, name: str) -> None:
-        draft = self.ledger.folder / f"part-{name}.zip"
+        draft = self.run.folder / f"part-{name}.zip"
         self.model.save(draft)
-        draft.replace(self.ledger.folder / f"{name}.zip")
+        draft.replace(self.run.folder / f"{name}.zip")
 
 
 def _predict(model: Any, observation: Any, deterministic: bool) -> Any:

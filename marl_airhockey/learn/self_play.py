@@ -1,4 +1,4 @@
-"""Self-play: worlds in which the learner meets itself, its past and scripts."""
+"""Self-play: worlds in which the learner plays itself, its snapshots and scripts."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.episode import StepResult
 from marl_airhockey.world.roster import Roster
 
-MEMORY = 0.05
-"""Weight of the newest game in the running score against an opponent."""
+SCORE_WEIGHT = 0.05
+"""Weight of the latest game in the running score against an opponent"""
 
 
-class Arena(AirHockeyVecEnv):
-    """Slots of the learner: all seats of some worlds, one team's in the others.
+class SelfPlayVecEnv(AirHockeyVecEnv):
+    """Vector environment of the learner: all seats of some worlds, one team in others.
 
-    At every start of an episode in those others the learner gets a team, and every
-    other team the same opponent, drawn from scripts and from the pool of snapshots: the
-    more likely, the more often the learner loses to it (prioritised fictitious
-    self-play; Vinyals et al., 2019).
+    In those others, at every start of an episode, the learner is given a team and all
+    other teams the same opponent. It is drawn from scripts and from the pool of
+    snapshots: the more often the learner loses to one, the more likely (prioritised
+    fictitious self-play; Vinyals et al., 2019).
 
     Args:
-        scenario: a game with teams.
-        num_worlds: B.
-        keywords: of the environment.
-        scripts: drivers, by name; always in the pool.
+        scenario: name of a game with teams.
+        num_worlds: number of worlds, B.
+        keywords: keywords of the environment.
+        scripts: names of drivers that are always in the pool.
         mirror: share of the worlds in which the learner plays all seats.
         script_share: share of the other worlds' games that are against scripts.
-        priority: the power of the share of lost games in the drawing.
+        priority: power of the share of lost games in the drawing.
         size: most snapshots in the pool.
-        folder: where snapshots are kept.
-        seed: of the drawing.
+        folder: folder of the snapshots.
+        seed: seed of the drawing.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class Arena(AirHockeyVecEnv):
         scenario: str,
         num_worlds: int,
         keywords: Keywords,
+        *,
         scripts: Sequence[str],
         mirror: float,
         script_share: float,
@@ -75,47 +76,54 @@ class Arena(AirHockeyVecEnv):
         self._snapshots: list[Path] = []
         mirrored = np.arange(self._mirrored)
         others = np.arange(self._mirrored, num_worlds)
-        each, mates = len(scene.seats), self._members.shape[1]
-        self._rows = np.concatenate([mirrored.repeat(each), others.repeat(mates)])
-        self._seats = np.tile(np.arange(each), len(mirrored))
+        seats, mates = len(scene.seats), self._members.shape[1]
+        self._rows = np.concatenate([mirrored.repeat(seats), others.repeat(mates)])
+        self._seats = np.tile(np.arange(seats), len(mirrored))
         self._seats = np.concatenate([self._seats, np.zeros(len(others) * mates, int)])
         self._learner = np.zeros(num_worlds, np.int64)
         self.num_envs = len(self._rows)
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
         for path in sorted(folder.glob("*.npz")):
-            self._enlist(path)
+            self._add_opponent(path)
 
     @property
     def scores(self) -> dict[str, float]:
-        """The learner's running score against everybody, by name."""
+        """Running score of the learner against each opponent, by name."""
         names = self._roster.names
         return dict(zip(names, self._scores.tolist(), strict=True))
 
     def snapshot(self, policy: Frozen, steps: int) -> None:
-        """Take the learner as it is into the pool; an old one that it beats leaves."""
+        """Add the learner as it is to the pool.
+
+        In a full pool it replaces the snapshot that the learner beats most often.
+
+        Args:
+            policy: the learner.
+            steps: steps of training so far; names the file.
+        """
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"{steps:012d}.npz"
         policy.save(path)
-        self._enlist(path)
+        self._add_opponent(path)
 
-    def _enlist(self, path: Path) -> None:
+    def _add_opponent(self, path: Path) -> None:
         driver = frozen_policy(Frozen.load(path), str(path), deterministic=False)
         if len(self._snapshots) < self._size:
             self._roster.add(path.stem, driver)
             self._scores = np.append(self._scores, 0.5)
             self._snapshots.append(path)
             return
-        beaten = int(self._scores[self._scripts :].argmax())
-        player = self._scripts + beaten
-        self._snapshots[beaten].unlink()
-        self._snapshots[beaten] = path
+        weakest = int(self._scores[self._scripts :].argmax())
+        player = self._scripts + weakest
+        self._snapshots[weakest].unlink()
+        self._snapshots[weakest] = path
         self._roster.replace(player, path.stem, driver)
         self._scores[player] = 0.5
         self._begin(np.flatnonzero((self._roster.seated == player).any(-1)))
 
     def _draw(self, count: int) -> Array:
-        """(count,) opponents."""
+        """Draw (count,) opponents, by number."""
         weight = np.maximum(1.0 - self._scores, 0.0) ** self._priority + 0.02
         groups = slice(0, self._scripts), slice(self._scripts, None)
         shares = self._script_share, 1.0 - self._script_share
@@ -141,7 +149,7 @@ class Arena(AirHockeyVecEnv):
         self._roster.begin(worlds)
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
-        """Take the results of games into the running scores; draw new opponents."""
+        """Add the results of games to the running scores; draw new opponents."""
         seats = self._members[:, 0]
         for world in worlds[worlds >= self._mirrored].tolist():
             won = last.success[world, seats]
@@ -149,7 +157,7 @@ class Arena(AirHockeyVecEnv):
             score = float(won[self._learner[world]])
             if not won.any():
                 score = 1.0 / len(seats)
-            self._scores[player] += MEMORY * (score - self._scores[player])
+            self._scores[player] += SCORE_WEIGHT * (score - self._scores[player])
         self._begin(worlds)
 
     def _pick(self, rows: Array) -> Array:
@@ -169,31 +177,33 @@ class Arena(AirHockeyVecEnv):
         return self._slots(observation)
 
     def step_async(self, actions: Array) -> None:
-        """Take the learner's actions (slots, 2) and ask the opponents for theirs."""
+        """Take the learner's actions (slots, 2) and let the opponents choose theirs."""
         self._actions = np.zeros((self.world.num_worlds, len(self._teams), 2))
         self._actions[self._rows, self._seats] = actions
         self._roster.ask(self._actions)
 
 
-def environment(config: TrainConfig, num_worlds: int, pool: Path) -> AirHockeyVecEnv:
-    """The worlds that a configuration is trained in, or a part of them.
+def make_training_env(
+    config: TrainConfig, num_worlds: int, pool: Path
+) -> AirHockeyVecEnv:
+    """Build the worlds that a configuration is trained in, or a part of them.
 
     Args:
-        config: of the run.
-        num_worlds: how many of them.
+        config: configuration of the run.
+        num_worlds: number of worlds.
         pool: folder of the snapshots of self-play.
     """
     if not config.self_play:
         return make_sb3_vec(config.scenario, num_worlds, **config.keywords)
-    return Arena(
+    return SelfPlayVecEnv(
         config.scenario,
         num_worlds,
         config.keywords,
-        config.opponents,
-        config.mirror,
-        config.script_share,
-        config.priority,
-        config.pool,
-        pool,
-        config.seed,
+        scripts=config.opponents,
+        mirror=config.mirror,
+        script_share=config.script_share,
+        priority=config.priority,
+        size=config.pool,
+        folder=pool,
+        seed=config.seed,
     )

@@ -1,8 +1,8 @@
-"""Train a policy with PPO.
+"""Training of a policy by PPO, with a choice of engines.
 
-A run is a folder: ``config.toml`` (resolved), ``versions.json``, progress tables and
-tensorboard events, ``evaluations.csv``, the best and the last policy, and
-``state.json`` from which a killed run goes on.
+A run is a folder: ``config.toml`` (all settings and the run format), ``versions.json``,
+progress tables and tensorboard events, ``evaluations.csv``, the best and the last
+policy, and ``state.json``, from which a killed run is resumed.
 """
 
 from __future__ import annotations
@@ -16,25 +16,26 @@ from pathlib import Path
 
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.learn.config import TrainConfig, load_config
-from marl_airhockey.learn.grade import Grades
-from marl_airhockey.learn.run import Ledger, Report
+from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.run import ProgressCallback, TrainingRun
 
 
 def train(
-    config: TrainConfig | None, folder: Path, report: Report | None = None
-) -> Grades:
-    """Train, or go on with a run that was cut off.
+    config: TrainConfig | None, folder: Path, report: ProgressCallback | None = None
+) -> Metrics:
+    """Train a policy, or resume a run that was cut off.
 
     Args:
-        config: what to do; None to resume the run in the folder.
-        folder: of the run; must be new unless it is resumed.
-        report: called as training goes on.
+        config: configuration of a new run; None to resume the run in the folder.
+        folder: folder of the run; must be new unless it is resumed.
+        report: called during training.
 
     Returns:
         The last row of ``evaluations.csv``.
 
     Raises:
-        ValueError: a folder that holds another run, or no run to resume.
+        ValueError: a folder that holds another run, no run to resume, or one that was
+            begun by an older version.
         RuntimeError: a missing extra, with the line that installs it.
     """
     if config is None:
@@ -43,45 +44,46 @@ def train(
         raise ValueError(f"{folder} holds a run already: use --resume, or another")
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
-    learn = ENGINES[config.engine]()
+    engine = ENGINES[config.engine]()
     if not (folder / "config.toml").exists():
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "config.toml").write_text(config.to_toml())
         (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
-    ledger = Ledger(config, folder, report)
-    return learn(ledger) if ledger.left > 0 else ledger.row
+    run = TrainingRun(config, folder, report)
+    return engine(run) if run.steps_left > 0 else run.latest
 
 
-Learn = Callable[[Ledger], Grades]
+Engine = Callable[[TrainingRun], Metrics]
+"""Function that trains a run to its end and returns the last evaluation"""
 
 
-def _sb3() -> Learn:
+def _sb3() -> Engine:
     require("stable_baselines3", "train")
-    from marl_airhockey.learn.sb3 import learn
+    from marl_airhockey.learn.sb3 import train_with_sb3
 
-    return learn
+    return train_with_sb3
 
 
-def _rllib() -> Learn:
+def _rllib() -> Engine:
     require("ray", "distributed")
-    from marl_airhockey.learn.rllib import learn
+    from marl_airhockey.learn.rllib import train_with_rllib
 
-    return learn
+    return train_with_rllib
 
 
-ENGINES: dict[str, Callable[[], Learn]] = {"sb3": _sb3, "rllib": _rllib}
-"""How policies are trained, by name; each is imported when it is asked for."""
+ENGINES: dict[str, Callable[[], Engine]] = {"sb3": _sb3, "rllib": _rllib}
+"""Loaders of the engines, by name; an engine is imported when it is used"""
 
 
 def versions() -> dict[str, str]:
-    """Versions of all that a result may depend on, and the git hash of a checkout."""
+    """Return versions of all that a result may depend on, and a checkout's git hash."""
     names = ("marl_airhockey", "numpy", "gymnasium", "pettingzoo", "pymunk", "torch")
     found = {"python": platform.python_version()}
     for name in (*names, "stable_baselines3"):
         found[name] = metadata.version(name)
     git = ["git", "-C", str(Path(__file__).parent)]
     try:
-        # An installed copy may lie inside a repository of somebody else's.
+        # An installed copy may lie inside an unrelated repository.
         tracked = [*git, "ls-files", "--error-unmatch", Path(__file__).name]
         subprocess.run(tracked, capture_output=True, check=True)
         head = [*git, "rev-parse", "HEAD"]

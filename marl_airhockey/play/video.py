@@ -13,7 +13,8 @@ from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.core.state import State, still_state
 from marl_airhockey.evaluation.recordings import read
 from marl_airhockey.registry import make_scenario
-from marl_airhockey.render.renderer import Frame, Renderer, draw
+from marl_airhockey.render.picture import Frame, draw
+from marl_airhockey.render.renderer import Renderer
 from marl_airhockey.render.video import write_video
 
 EVERY = 2

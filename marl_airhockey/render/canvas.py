@@ -1,4 +1,4 @@
-"""A picture in metres, anti-aliased: what the drawing of the table is made with."""
+"""Anti-aliased canvas with coordinates in metres, by OpenCV."""
 
 from __future__ import annotations
 
@@ -11,16 +11,23 @@ from marl_airhockey.core.table import Table
 from marl_airhockey.types import Array
 
 Colour = tuple[int, int, int]
-"""RGB"""
+"""RGB, 0 to 255"""
 ROOM: Colour = (236, 239, 243)
 SMOOTH = 2
-"""Drawn this many times larger, then averaged."""
+"""Factor by which pictures are drawn larger, to be averaged down"""
 SHIFT = 6
-"""Fractional bits of OpenCV's coordinates."""
+"""Fractional bits of OpenCV's fixed-point coordinates"""
 
 
 class Canvas:
-    """A picture in metres: the table's bounding box and a margin."""
+    """Canvas in metres (table frame): the table's bounding box and a margin.
+
+    Args:
+        table: the table.
+        width: width of the finished picture, pixels.
+        margin: space around the table, m.
+        bar: height of the title bar, pixels of the finished picture.
+    """
 
     def __init__(self, table: Table, width: int, margin: float, bar: int) -> None:
         corners = np.asarray(table.vertices)
@@ -34,7 +41,7 @@ class Canvas:
         self.bottom = tall
 
     def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
-        """Fixed-point pixel of a point in metres."""
+        """Return the fixed-point pixel of a point (2,) m."""
         x = (float(point[0]) - self.low[0]) * self.scale
         y = self.bottom - (float(point[1]) - self.low[1]) * self.scale
         return round(x * 2**SHIFT), round(y * 2**SHIFT)
@@ -42,7 +49,7 @@ class Canvas:
     def disc(
         self, centre: Sequence[float] | Array, radius: float, colour: Colour
     ) -> None:
-        """A filled disc, m."""
+        """Draw a filled disc; centre and radius in m."""
         size = max(round(radius * self.scale * 2**SHIFT), 1)
         cv2.circle(self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT)
 
@@ -53,7 +60,7 @@ class Canvas:
         colour: Colour,
         width: float = 1.5,
     ) -> None:
-        """A circle; its line is ``width`` pixels wide."""
+        """Draw a circle (m) with a line ``width`` pixels wide."""
         size = max(round(radius * self.scale * 2**SHIFT), 1)
         line = max(round(width * SMOOTH), 1)
         cv2.circle(
@@ -67,13 +74,13 @@ class Canvas:
         colour: Colour,
         width: float = 1.5,
     ) -> None:
-        """A straight line."""
+        """Draw a straight line (m), ``width`` pixels wide."""
         wide = max(round(width * SMOOTH), 1)
         a, b = self.pixel(start), self.pixel(end)
         cv2.line(self.image, a, b, colour, wide, cv2.LINE_AA, SHIFT)
 
     def polygon(self, corners: Array, colour: Colour, width: float = 0.0) -> None:
-        """A filled polygon, or its outline if ``width`` is given."""
+        """Fill a polygon (K, 2) m, or with ``width`` (pixels) draw its outline."""
         points = np.array([self.pixel(c) for c in corners], np.int32)
         if width:
             wide = max(round(width * SMOOTH), 1)
@@ -84,15 +91,15 @@ class Canvas:
     def text(
         self, words: str, x: int, size: float, colour: Colour, right: bool
     ) -> None:
-        """Words in the title bar, ``x`` pixels from its left or right end."""
+        """Write words in the title bar, ``x`` pixels from its left or right end."""
         font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
         scale = size * SMOOTH
         (wide, high), _ = cv2.getTextSize(words, font, scale, thick)
         left = self.image.shape[1] - x * SMOOTH - wide if right else x * SMOOTH
-        place = (left, (self.bar + high) // 2)
-        cv2.putText(self.image, words, place, font, scale, colour, thick, cv2.LINE_AA)
+        corner = (left, (self.bar + high) // 2)
+        cv2.putText(self.image, words, corner, font, scale, colour, thick, cv2.LINE_AA)
 
-    def picture(self) -> Array:
-        """The finished picture (H, W, 3) uint8 RGB."""
+    def finish(self) -> Array:
+        """Return the finished picture (H, W, 3) uint8 RGB, freshly allocated."""
         size = (self.image.shape[1] // SMOOTH, self.image.shape[0] // SMOOTH)
         return np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA))

@@ -1,4 +1,4 @@
-"""Video: see the definitions."""
+"""Video files: GIF by Pillow, MP4 by OpenCV."""
 
 from __future__ import annotations
 
@@ -13,10 +13,15 @@ from marl_airhockey.types import Array
 
 
 def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path:
-    """Write pictures (H, W, 3) as a .gif or an .mp4.
+    """Write pictures (H, W, 3) uint8 RGB as a .gif or an .mp4; return its path.
+
+    Args:
+        path: file to write; its folder is made.
+        pictures: of one size.
+        fps: pictures per second.
 
     Raises:
-        ValueError: no picture, or another ending.
+        ValueError: no pictures, or another ending.
         OSError: the file could not be written.
     """
     path = Path(path)
@@ -31,8 +36,10 @@ def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path
             Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
             for p in pictures
         ]
-        rest, lasts = frames[1:], round(1000 / fps)
-        frames[0].save(path, append_images=rest, save_all=True, duration=lasts, loop=0)
+        rest, duration = frames[1:], round(1000 / fps)
+        frames[0].save(
+            path, append_images=rest, save_all=True, duration=duration, loop=0
+        )
     elif path.suffix == ".mp4":
         size = (pictures[0].shape[1], pictures[0].shape[0])
         code = cv2.VideoWriter.fourcc(*"mp4v")

@@ -1,4 +1,4 @@
-"""A pygame-ce window for render_mode="human"."""
+"""Window of render_mode="human", by pygame-ce."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from marl_airhockey.types import Array
 
 
 class Window:
-    """Shows pictures at the pace of the game.
+    """Window that shows pictures at the pace of the game.
 
     Args:
-        width: pixels.
-        height: pixels.
-        rate: pictures a second.
+        width: width, pixels.
+        height: height, pixels.
+        rate: pictures per second.
 
     Raises:
         RuntimeError: pygame-ce is missing.
@@ -29,7 +29,7 @@ class Window:
         self._clock = pygame.time.Clock()
 
     def show(self, picture: Array) -> None:
-        """Put a picture (H, W, 3) on the screen and wait for its turn."""
+        """Put a picture (H, W, 3) uint8 on the screen and wait until the next."""
         pygame = self._pygame
         pygame.event.pump()
         surface = pygame.surfarray.make_surface(picture.swapaxes(0, 1))

@@ -1,1 +1,1 @@
-"""Other physics: how policies do there, and what it is."""
+"""Other physics: success of policies there, and identification of its parameters."""

@@ -1,4 +1,4 @@
-"""Sim to sim: how policies do in physics that they were not trained in."""
+"""Sim-to-sim transfer: success of policies in physics they were not trained in."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ TUNING: dict[str, Any] = {
     "evaluations": 5,
     "eval_episodes": 50,
 }
-"""What changes when a policy is trained on where it is to be used."""
+"""Settings that replace a run's when its policy is trained further on robosuite."""
 
 
 @dataclass(frozen=True)
-class Transfer:
-    """A policy's success in one world that it did not know, or did."""
+class TransferResult:
+    """Success of one policy on one backend in one profile."""
 
     policy: str
     backend: str
@@ -36,14 +36,14 @@ class Transfer:
     episodes: int
     success: float
     interval: tuple[float, float]
-    """95 %, Wilson's."""
+    """95 % interval of the success, Wilson's"""
 
     def to_json(self) -> dict[str, Any]:
-        """For a report."""
+        """Return the fields as a JSON object."""
         return asdict(self)
 
 
-def measure(
+def measure_transfer(
     policies: dict[str, Driver],
     scenario: str,
     backends: Sequence[str],
@@ -51,17 +51,17 @@ def measure(
     episodes: int = 200,
     keywords: Keywords | None = None,
     report: Callable[[], None] = lambda: None,
-) -> list[Transfer]:
+) -> list[TransferResult]:
     """Evaluate policies in all backends and profiles, on the same episodes' seeds.
 
     Args:
-        policies: by what to call them.
-        scenario: what they play.
-        backends: names.
-        profiles: names.
-        episodes: of each.
-        keywords: of the environments, but for these two.
-        report: called after each.
+        policies: drivers, by the name to report.
+        scenario: name of the scenario.
+        backends: names of backends.
+        profiles: names of profiles.
+        episodes: episodes of each combination.
+        keywords: keywords of the environments; backend and profile are replaced.
+        report: called after each combination.
     """
     rows = []
     for name, driver in policies.items():
@@ -74,29 +74,32 @@ def measure(
                 }
                 found = evaluate(driver, name, scenario, episodes, TEST_SEED, chosen)
                 shown = found.success, found.success_interval
-                rows.append(Transfer(name, backend, profile, episodes, *shown))
+                rows.append(TransferResult(name, backend, profile, episodes, *shown))
                 report()
     return rows
 
 
-def tuned(run: Path, steps: int) -> TrainConfig:
-    """The configuration that trains a run's policy further on robosuite.
+def fine_tuning_config(run: Path, steps: int) -> TrainConfig:
+    """Return the configuration that trains a run's policy further on robosuite.
 
     Args:
         run: folder of the run.
-        steps: of single worlds.
+        steps: steps of single worlds.
+
+    Raises:
+        ValueError: no run, or one of an older version.
     """
     config = load_config(run / "config.toml")
     return dataclasses.replace(config, **TUNING, init=str(run), total_steps=steps)
 
 
-def schooled(scenario: str, profile: str, seed: int) -> TrainConfig:
-    """The preset for a scenario, in the batched 2D table."""
+def pretraining_config(scenario: str, profile: str, seed: int) -> TrainConfig:
+    """Return the preset for a scenario, on the 2D table (backend "numba")."""
     return preset(scenario, {"profile": profile, "seed": seed})
 
 
-def picture(rows: Sequence[Transfer], path: Path) -> None:
-    """Success by policy, a panel for each profile, a colour for each backend."""
+def plot_transfer(rows: Sequence[TransferResult], path: Path) -> None:
+    """Draw success by policy: a panel for each profile, a colour for each backend."""
     import matplotlib.pyplot as plt
 
     from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
@@ -115,11 +118,13 @@ def picture(rows: Sequence[Transfer], path: Path) -> None:
     )
     for axes, profile in zip(grid[0], profiles, strict=True):
         for k, (backend, ink) in enumerate(zip(backends, (INK, *INKS), strict=False)):
-            off = 0.16 * (k - (len(backends) - 1) / 2)
+            offset = 0.16 * (k - (len(backends) - 1) / 2)
             mine = [r for r in rows if (r.profile, r.backend) == (profile, backend)]
-            at = [policies.index(row.policy) - off for row in mine]
-            axes.hlines(at, *zip(*(r.interval for r in mine), strict=True), color=ink)
-            axes.plot([r.success for r in mine], at, "o", color=ink, label=backend)
+            heights = [policies.index(row.policy) - offset for row in mine]
+            axes.hlines(
+                heights, *zip(*(r.interval for r in mine), strict=True), color=ink
+            )
+            axes.plot([r.success for r in mine], heights, "o", color=ink, label=backend)
         axes.set_yticks(range(len(policies)), policies)
         axes.set(
             xlim=(-0.03, 1.03),

@@ -1,0 +1,116 @@
+"""Play as arrays of states and commands, from a world or from recordings.
+
+Data for the fit in `transfer.system_id`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.evaluation.evaluate import build_driven_world
+from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.registry import make_scenario
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords
+
+JUMP_SPEED = 1.5 * PUCK_SPEED_CAP
+"""Speed, m/s, above which a body has not moved by physics: served or put by hand."""
+
+
+@dataclass(frozen=True)
+class RecordedPlay:
+    """Rows of T control steps in one scene, one episode after the other."""
+
+    scene: Scene
+    control_dt: float
+    position: Array
+    """(T, N, 2) m, after each step"""
+    velocity: Array
+    """(T, N, 2) m/s, after each step"""
+    command: Array
+    """(T, seats, 2) m/s, of the step that led there"""
+    follows: Array
+    """(T,) bool, True where a row is one step after the row before"""
+
+    def segment_starts(self, steps: int) -> Array:
+        """Return (W,) rows that at least ``steps`` rows follow; none overlap.
+
+        A row in which a body has jumped, say a served puck, follows no other.
+        """
+        moved = np.diff(self.position, axis=0, prepend=self.position[:1])
+        distance = np.hypot(moved[..., 0], moved[..., 1]).max(-1)
+        jumped = distance > JUMP_SPEED * self.control_dt
+        length, starts = 0, []
+        for row, follows in enumerate(self.follows & ~jumped):
+            length = length + 1 if follows else 0
+            if length == steps + 1:
+                starts.append(row - steps)
+                length = 0
+        return np.array(starts, np.int64)
+
+
+def record_play(
+    scenario: str, driver: Driver, steps: int, seed: int, keywords: Keywords
+) -> RecordedPlay:
+    """Let a driver play ``steps`` control steps in one world and record them.
+
+    Args:
+        scenario: name of the scenario.
+        driver: at ``paddle_0`` and at the seats of its team.
+        steps: control steps.
+        seed: seed of the first episode.
+        keywords: keywords of the environment.
+    """
+    world = build_driven_world(driver, scenario, 1, keywords)
+    world.reset(seed)
+    no_actions = np.zeros((1, 0, 2))
+    rows: list[tuple[Array, Array, Array, bool]] = []
+    first_of_episode = True
+    for _ in range(steps):
+        result = world.step(no_actions)
+        position = world.state.position[0].copy()
+        velocity = world.state.velocity[0].copy()
+        command = world.command[0].copy()
+        rows.append((position, velocity, command, not first_of_episode))
+        first_of_episode = bool(result.terminated[0] or result.truncated[0])
+        if first_of_episode:
+            world.reset()
+    scene, dt = world.scene, world.control_dt
+    world.close()
+    columns = (np.array(column) for column in zip(*rows, strict=True))
+    return RecordedPlay(scene, dt, *columns)
+
+
+def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
+    """Read recordings of ``airhockey play --record``.
+
+    Raises:
+        ValueError: no recordings, or recordings of several scenarios.
+    """
+    parts: list[tuple[Array, ...]] = []
+    names = set()
+    for path in paths:
+        meta, steps, _ = read(path)
+        names.add(meta["match"]["scenario"])
+        scenario = make_scenario(meta["match"]["scenario"], **meta["options"])
+        position = np.array(
+            [row["paddles"] + [p[:2] for p in row["pucks"]] for row in steps]
+        )
+        velocity = np.array(
+            [row["paddle_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
+        )
+        command = np.array([row["command"] for row in steps])
+        follows = np.arange(len(steps)) > 0
+        parts.append((position, velocity, command, follows))
+    if len(names) != 1:
+        found = ", ".join(sorted(names)) or "no recordings (.jsonl files)"
+        raise ValueError(f"recordings of one scenario are needed, there are: {found}")
+    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return RecordedPlay(scenario.scene, meta["control_dt"], *columns)
