@@ -1,12 +1,11 @@
-"""Studies: plans and orders, a way through one, what is kept and what is erased."""
+"""Studies: a course through a plan, what is kept and what is erased."""
 
-import itertools
 import json
 import time
-from collections import Counter
 
 import pytest
-from pages import aim, line, page_at, running, wait
+from pages import aim, line
+from study_steps import PLAN, answer, consent, enter, plan_writer, play, stage
 
 from marl_airhockey.evaluation.recordings import head
 from marl_airhockey.play.live_match import RATE
@@ -14,128 +13,13 @@ from marl_airhockey.play.report import summarize
 from marl_airhockey.play.session import GONE, GRACE, IDLE
 from marl_airhockey.study.admission import ABSENT
 from marl_airhockey.study.answers import read_answers
-from marl_airhockey.study.archive import claim_folder, diaries, erase
-from marl_airhockey.study.plan import EXAMPLE, Opponent, Plan
-from marl_airhockey.study.plan_file import load_plan
+from marl_airhockey.study.archive import diaries, erase
 from marl_airhockey.study.study import Study
-
-PLAN = """
-scenario = "duel"
-version = "3"
-information = "First.\\n\\nSecond."
-agree = ["Yes."]
-opponents = ["still", {name = "striker", reaction = 100}]
-games = 1
-practice = 1
-practice_opponent = "still"
-rest = 0
-questions = ["origin", {id = "fun", text = "Fun?"}]
-[options]
-seconds = 1.0
-"""
 
 
 @pytest.fixture
 def plan(tmp_path):
-    def write(text=PLAN):
-        path = tmp_path / "plan.toml"
-        path.write_text(text)
-        return load_plan(path)
-
-    return write
-
-
-def enter(study, key):
-    client = study.connect()
-    study.receive(client, line("hello", key=key))
-    study.tick()
-    return client
-
-
-def stage(study, client):
-    study.tick()
-    client.limiter._level = 100.0
-    return json.loads(client.frame)["study"]
-
-
-def consent(study, client):
-    study.receive(client, line("consent", version="3"))
-
-
-def play(study, client):
-    study.receive(client, line("start"))
-    study.tick()
-    assert study.match.phase == "countdown"
-    while study.match.phase != "done":
-        study.tick()
-    assert stage(study, client)["stage"] == "over"
-    for _ in range(3 * RATE):
-        study.tick()
-
-
-def answer(study, client, fun=5):
-    study.receive(client, line("answer", question="origin", value=2))
-    study.receive(client, line("answer", question="fun", value=fun))
-
-
-@pytest.mark.parametrize("count", range(1, 9))
-def test_each_opponent_comes_after_each_other_equally_often(count):
-    plan = Plan(
-        "duel",
-        "text",
-        ("yes",),
-        "1",
-        opponents=tuple(map(Opponent, "abcdefgh"[:count])),
-    )
-    rows = [plan.sequence(k) for k in range(count if count % 2 == 0 else 2 * count)]
-    assert all(sorted(row) == list(range(count)) for row in rows)
-    for place in range(count):
-        assert len(set(Counter(row[place] for row in rows).values())) == 1
-    after = Counter(pair for row in rows for pair in itertools.pairwise(row))
-    assert len(after) == count * (count - 1)
-    assert len(set(after.values())) <= 1
-    assert plan.sequence(3) == plan.sequence(3 + len(rows))
-
-
-def test_the_order_can_be_drawn_or_fixed_and_follows_the_seed(plan):
-    fixed = plan(PLAN.replace("games = 1", 'games = 1\norder = "fixed"'))
-    assert [fixed.sequence(k) for k in range(4)] == [[0, 1]] * 4
-    drawn = plan(PLAN.replace("games = 1", 'games = 1\norder = "random"\nseed = 4'))
-    found = [drawn.sequence(k) for k in range(20)]
-    assert {tuple(row) for row in found} == {(0, 1), (1, 0)}
-    assert found == [drawn.sequence(k) for k in range(20)]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "complaint"),
-    [
-        ('version = "3"', "", "lacks.*version"),
-        ('version = "3"', "version = 3", "version: 3"),
-        ("games = 1", "games = 0", "games"),
-        ("games = 1", "games = true", "games: True"),
-        ("games = 1", "game = 1", "game: unknown"),
-        ("games = 1", 'order = "best"', "order: 'best'.*balanced, random, fixed"),
-        ('agree = ["Yes."]', "agree = []", "agree"),
-        ('agree = ["Yes."]', "agree = [1]", "agree: must be a list of texts"),
-        ('"still", {', '"striker (reaction 0.1)", {', "there twice"),
-        ("reaction = 100", "speed = 1", "speed: unknown; an opponent has"),
-        ('name = "striker"', 'label = "x"', "an opponent lacks 'name'|lacks.*name"),
-        ('id = "fun"', 'id = "Fun!"', "must be of a-z"),
-        ('text = "Fun?"', 'text = "Fun?", choices = ["x"]', "at least two"),
-        ("games = 1", 'digest = "x"', "digest: unknown"),
-        ('"origin"', '"mood"', "'mood' is not shipped"),
-        ("reaction = 100", "reaction = 900", "reaction"),
-        ('"still", {', '"nobody", {', "unknown driver"),
-        ('"still", {', '"zoo/juggle", {', "expects observations"),
-        ('{name = "striker"', '{name = "person"', "cannot give a person a handicap"),
-        ('scenario = "duel"', 'scenario = "juggle"', "needs no opponents"),
-        ("[options]", "[options", "no TOML"),
-    ],
-)
-def test_a_bad_plan_is_named(plan, tmp_path, old, new, complaint):
-    assert old in PLAN
-    with pytest.raises(ValueError, match=complaint):
-        Study(plan(PLAN.replace(old, new)), tmp_path / "out")
+    return plan_writer(tmp_path)
 
 
 def test_a_participant_goes_through_a_plan(plan, tmp_path):
@@ -331,17 +215,6 @@ def test_whom_the_leader_erases_is_out(plan, tmp_path):
     consent(study, enter(study, "b"))
 
 
-def test_a_folder_is_that_of_one_plan(plan, tmp_path):
-    plan()
-    claim_folder(tmp_path / "out", tmp_path / "plan.toml")
-    claim_folder(tmp_path / "out", tmp_path / "plan.toml")
-    plan(PLAN.replace("games = 1", "games = 2"))
-    with pytest.raises(ValueError, match="another plan"):
-        claim_folder(tmp_path / "out", tmp_path / "plan.toml")
-    with pytest.raises(ValueError, match=r"--out .*exists"):
-        claim_folder(tmp_path / "plan.toml", tmp_path / "plan.toml")
-
-
 def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
     text = (
         PLAN.replace('"duel"', '"juggle"')
@@ -367,45 +240,3 @@ def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
     for _ in range(50 * RATE):
         study.tick()
     assert stage(study, client)["stage"] == "ready"
-
-
-def test_the_example_is_a_plan():
-    assert load_plan(EXAMPLE).blocks == 3
-
-
-def test_a_participant_in_the_browser(browser, plan, tmp_path):
-    plan(PLAN)
-    complaints = []
-    words = ("study", "run", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "o"))
-    with running(*words, "--port", "0", "--no-browser") as (address, _):
-        page = page_at(browser, address, complaints)
-        go = page.get_by_role("button", name="Take part")
-        assert go.is_disabled()
-        page.get_by_role("checkbox").check()
-        go.click()
-        for _ in range(2):
-            wait(page, "s.study.stage === 'ready'")
-            page.locator("#go").click()
-            wait(page, "s.phase === 'play'")
-            page.keyboard.down("ArrowUp")
-            wait(page, "s.paddles[0][1] > 0.1 || s.phase === 'done'")
-            page.keyboard.up("ArrowUp")
-        wait(page, "s.study.stage === 'questions'")
-        page.get_by_label("a program").check()
-        page.reload()
-        page.get_by_label("a program").check()
-        go = page.get_by_role("button", name="Go on")
-        assert go.is_disabled()
-        page.get_by_label("6", exact=True).check()
-        go.click()
-        wait(page, "s.study.stage === 'ready' && s.study.block === 1")
-        page.get_by_role("button", name="Withdraw").click()
-        page.get_by_role("button", name="Stay").click()
-        page.get_by_role("button", name="Withdraw").click()
-        page.get_by_role("button", name="Erase everything").click()
-        wait(page, "s.study.stage === 'erased'")
-        page.get_by_role("button", name="Next participant").click()
-        page.get_by_role("button", name="Take part").wait_for()
-        page.close()
-    assert not complaints
-    assert [p.name for p in (tmp_path / "o").rglob("*.jsonl")] == ["erased.jsonl"]
