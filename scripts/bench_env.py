@@ -1,4 +1,4 @@
-"""Env-steps and agent-steps per CPU-second, in turns with others in one run.
+"""Env-steps and agent-steps per CPU-second, in rounds with others in one run.
 
     python scripts/bench_env.py --rounds 5 --seconds 2 \
         --vmas X/bin/python --jaxmarl Y/bin/python
@@ -7,7 +7,7 @@ One world at a time: our dict environment, a bare loop of Chipmunk's own step ov
 very same world (paddle velocities set, pucks put back as often as episodes restart),
 PettingZoo's multiwalker (pip install box2d) and mpe2's simple_tag. Many at a time: our
 arrays, and VMAS and JaxMARL, each in an interpreter of its own that works only in its
-turns, on one thread as ours does. Actions are drawn beforehand; resets are included.
+rounds, on one thread as ours does. Actions are drawn beforehand; resets are included.
 VMAS has no automatic reset: its worlds are reset all together every 100 steps, which
 costs it least. Rates are per CPU-second of the process that steps, which a busy machine
 disturbs less than wall time; ratios are medians over the rounds.
@@ -41,7 +41,7 @@ Play = Callable[[], int]
 """Steps for a moment and says how many env-steps that were."""
 Made = tuple[Play, int]
 """An environment: what steps it, and its agents."""
-Turn = Callable[[float], dict[str, float]]
+MeasureRound = Callable[[float], dict[str, float]]
 """Steps for so many CPU-seconds and says steps, agents and the CPU-seconds."""
 CHUNK = 512
 """Steps of one world between two looks at the clock."""
@@ -206,7 +206,7 @@ def jaxmarl(scenario: str, number: int, length: int) -> Made:
 
 
 def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
-    """A turn by this process's CPU clock; never without a step."""
+    """Measure a round by this process's CPU clock; never without a step."""
     began = time.process_time()
     steps = play()
     while (spent := time.process_time() - began) < seconds:
@@ -215,16 +215,18 @@ def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
 
 
 def serve(make: Callable[..., Made], *args: Any) -> None:
-    """A peer's side: a turn for every line of seconds, answered by a line of JSON."""
+    """A peer's side: a round for every line of seconds, answered by a line of JSON."""
     with open(os.dup(1), "w") as answers:
         os.dup2(2, 1)  # what a peer itself prints is no answer
         play, agents = make(*args)
         for line in sys.stdin:
-            turn = clocked(play, agents, float(line))
-            print(json.dumps(turn), file=answers, flush=True)
+            found = clocked(play, agents, float(line))
+            print(json.dumps(found), file=answers, flush=True)
 
 
-def peer(stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any) -> Turn:
+def peer(
+    stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any
+) -> MeasureRound:
     """An environment in another interpreter, which gets the source of what it needs."""
     program = "\n".join(
         (
@@ -249,28 +251,28 @@ def peer(stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any) 
     assert asks is not None
     assert answers is not None
 
-    def turn(seconds: float) -> dict[str, float]:
+    def measure_round(seconds: float) -> dict[str, float]:
         print(seconds, file=asks, flush=True)
         if not (line := answers.readline()):
             raise typer.BadParameter(f"{python}: no answer from {make.__name__}{args}")
         found: dict[str, float] = json.loads(line)
         return found
 
-    return turn
+    return measure_round
 
 
 @dataclass
 class Row:
-    """What is measured, warmed up when made, and what was found in each turn."""
+    """What is measured, warmed up when made, and what was found in each round."""
 
     name: str
-    turn: Turn
+    measure_round: MeasureRound
     unit: str
     """What is compared: "env-steps" with one world, "agent-steps" with many"""
     found: list[dict[str, float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.turn(0.0)
+        self.measure_round(0.0)
 
     @property
     def agents(self) -> int:
@@ -278,8 +280,13 @@ class Row:
         return int(self.found[0]["agents"])
 
     def rates(self, unit: str) -> np.ndarray:
-        """Per CPU-second, a number for each turn."""
-        rates = np.array([turn["steps"] / turn["cpu"] for turn in self.found])
+        """Per CPU-second, a number for each round."""
+        rates = np.array(
+            [
+                measure_round["steps"] / measure_round["cpu"]
+                for measure_round in self.found
+            ]
+        )
         return rates * self.agents if unit == "agent-steps" else rates
 
     def to_json(self, mine: Row) -> dict[str, Any]:
@@ -340,8 +347,8 @@ def rows(
     ]
     for name, python, make_peer, theirs, option in away:
         if python is not None:
-            turn = peer(stack, python, make_peer, theirs, number, option)
-            out.append(Row(f"{name}, {number} worlds", turn, "agent-steps"))
+            measure_round = peer(stack, python, make_peer, theirs, number, option)
+            out.append(Row(f"{name}, {number} worlds", measure_round, "agent-steps"))
     return out
 
 
@@ -373,7 +380,7 @@ Python = partial(typer.Option, exists=True, dir_okay=False)
 def main(
     scenario: Annotated[str, typer.Option(help="Ours.")] = "juggle",
     rounds: Annotated[int, typer.Option(help="Turns.", min=1)] = 5,
-    seconds: Annotated[float, typer.Option(help="CPU-seconds a turn.")] = 2.0,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds a round.")] = 2.0,
     vmas_python: Annotated[Path | None, Python("--vmas", help=VMAS_HELP)] = None,
     jax_python: Annotated[Path | None, Python("--jaxmarl", help=JAX_HELP)] = None,
     peer_worlds: Annotated[
@@ -381,12 +388,12 @@ def main(
     ] = 1024,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Run all in turns and print rates and ratios."""
+    """Run all in rounds and print rates and ratios."""
     with ExitStack() as stack:
         measured = rows(stack, scenario, vmas_python, jax_python, peer_worlds)
         for _ in range(rounds):
             for row in measured:
-                row.found.append(row.turn(seconds))
+                row.found.append(row.measure_round(seconds))
     mine = {row.unit: row for row in reversed(measured)}
     found = [row.to_json(mine[row.unit]) for row in measured]
     console = Console()
@@ -394,7 +401,7 @@ def main(
         console.print_json(data=found)
         return
     console.width = max(console.width, 112)
-    console.print(show(found, f"{scenario}: {rounds} turns of {seconds} CPU-s"))
+    console.print(show(found, f"{scenario}: {rounds} rounds of {seconds} CPU-s"))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""How soon a moved pointer is seen, in headless Chromium.
+"""Benchmark of the page: how soon a moved pointer is seen, in headless Chromium.
 
     python scripts/bench_play.py --seconds 20
 
 Two cases: one player against a policy; two players and watchers (connections that take
 every frame as a page does). For each: the time from a pointer event to the picture
-that shows what the server made of it, frames of state per second, the server's loop
+that shows the server's answer, frames of state per second, the server's loop
 rate and its share of a core. Browser, watchers and server share the machine's cores,
 whose load is printed.
 """
@@ -39,7 +39,7 @@ pointer run at nearly the same rate, and one would measure their phases."""
 
 
 def serve(*options: str) -> tuple[str, subprocess.Popen[str]]:
-    """Start `airhockey play`; its address."""
+    """Start `airhockey play`; return its address and process."""
     command = [sys.executable, "-m", "marl_airhockey.cli", "play", "duel", *options]
     process = subprocess.Popen(
         [*command, "--port", "0", "--no-browser", "--option", "seconds=600"],
@@ -53,7 +53,7 @@ def serve(*options: str) -> tuple[str, subprocess.Popen[str]]:
 
 
 def cpu(pid: int) -> float:
-    """CPU-seconds of a process."""
+    """Return the CPU-seconds that a process has used."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -80,7 +80,7 @@ class Watchers:
 
 
 def seated(browser: Browser, address: str) -> Page:
-    """A page that has a seat."""
+    """Open a page that gets a seat."""
     size: Any = {"width": 1000, "height": 600}
     page = browser.new_page(viewport=size, bypass_csp=True)
     page.goto(address)
@@ -89,7 +89,7 @@ def seated(browser: Browser, address: str) -> Page:
 
 
 def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
-    """Move the pointers of all pages for a while; a row of the table."""
+    """Move the pointers of all pages for a while; return a row of the table."""
     boxes = []
     for page in pages:
         box = page.locator("#table").bounding_box()

@@ -8,7 +8,6 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
-from marl_airhockey.toolkit.starts import first_state
 
 TABLE = TABLES["standard"]
 DT = 0.05
@@ -29,15 +28,21 @@ class Bench:
         rows = {name: np.full(1, value) for name, value in values.items()}
         self.backend.set_physics(rows, np.arange(1))
 
-    def start(self, paddle, *others):
+    def reset(self, paddle, *others):
         """Place the paddle at (x, y) and the others at (x, y, vx, vy)."""
-        state = first_state(self.scene, 1)
+        state = self.scene.still_state(1)
         state.position[0, 0] = paddle
         for i, (x, y, vx, vy) in enumerate(others, start=1):
             state.position[0, i], state.velocity[0, i] = (x, y), (vx, vy)
-        self.backend.start(state, np.arange(1))
+        self.backend.reset(state, np.arange(1))
         return state
 
     def run(self, seconds, velocity=(0.0, 0.0)):
-        command = Command(np.array([[velocity]], dtype=float))
+        command = self.command(velocity)
         return [self.backend.step(command) for _ in range(round(seconds / DT))]
+
+    def command(self, velocity=(0.0, 0.0), prescribed=np.nan):
+        """A command to the paddle, (2,) m/s, or (4,) where it is prescribed."""
+        still = Command.still(self.scene, 1)
+        still.velocity[:], still.prescribed[:] = velocity, prescribed
+        return still

@@ -1,8 +1,6 @@
-import contextlib
 import importlib
 import os
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -56,14 +54,3 @@ def browser():
         )
         yield found
         found.close()
-
-
-def pytest_configure():
-    """Drop loops compiled before the last edit: numba looks only at their own file."""
-    folder = Path(ah.__file__).parent
-    newest = max(path.stat().st_mtime for path in folder.rglob("*.py"))
-    for compiled in folder.rglob("*.nb[ic]"):
-        # Another run of the tests may drop them at the same time.
-        with contextlib.suppress(FileNotFoundError):
-            if compiled.stat().st_mtime < newest:
-                compiled.unlink()

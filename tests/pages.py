@@ -55,3 +55,11 @@ def wait(page, condition):
     page.wait_for_function(
         f"(() => {{ const s = airhockey.state(); return {condition}; }})()"
     )
+
+
+@contextlib.contextmanager
+def served(*options):
+    """The address of a running `airhockey play`, and its process."""
+    options = ("play", *options, "--port", "0", "--no-browser")
+    with running(*options) as (address, process):
+        yield address, process

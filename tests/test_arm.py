@@ -6,13 +6,12 @@ from bench import DT, FLAT, TABLE, Bench
 from pages import aim, line
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.backend import Command
 from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.jit.threads import use_threads
-from marl_airhockey.play.live_match import RATE, Court
+from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import find_backend
 
@@ -76,7 +75,7 @@ def test_the_paddle_stays_on_the_table(rule):
 
 
 def test_a_paddle_follows_its_command(puck):
-    puck.start((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
+    puck.reset((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
     states = puck.run(0.4, velocity=(0.3, -0.2))
     np.testing.assert_allclose(states[-1].paddle_velocity[0, 0], (0.3, -0.2), atol=0.01)
     way = np.array((0.3, -0.2)) * (0.4 - DT / 2)
@@ -88,7 +87,7 @@ def test_a_paddle_follows_its_command(puck):
 def test_a_puck_falls_as_the_table_is_tilted():
     bench = Bench("robosuite", {"tilt": 5.5})
     pull = GRAVITY * np.sin(np.radians(5.5))
-    bench.start((-0.7, 0.2), (0.5, -0.2, 0.0, 0.0))
+    bench.reset((-0.7, 0.2), (0.5, -0.2, 0.0, 0.0))
     last = bench.run(0.5)[-1]
     np.testing.assert_allclose(last.puck_velocity[0, 0, 0], -0.5 * pull, rtol=1e-3)
     assert abs(last.puck_velocity[0, 0, 1]) < 1e-9
@@ -99,12 +98,12 @@ def test_a_puck_falls_as_the_table_is_tilted():
 def test_walls_and_paddles_return_their_share(puck, speed, share):
     names = ("wall_restitution", "paddle_restitution")
     puck.backend.worlds[0].surface.set_physics(FLAT | dict.fromkeys(names, share))
-    puck.start((-0.7, 0.15), (0.0, 0.0, 0.0, speed))
+    puck.reset((-0.7, 0.15), (0.0, 0.0, 0.0, speed))
     states = puck.run(0.3 / speed + 3 * DT)
     turned = [s.puck_velocity[0, 0, 1] for s in states if s.puck_velocity[0, 0, 1] < 0]
     # The first of these may lie within the contact.
     assert -turned[1] / speed == pytest.approx(share, abs=0.03)
-    puck.start((-0.6, 0.0), (-0.4, 0.0, -speed, 0.0))
+    puck.reset((-0.6, 0.0), (-0.4, 0.0, -speed, 0.0))
     states = puck.run(0.13 / speed + 2 * DT)
     assert states[-1].puck_velocity[0, 0, 0] / speed == pytest.approx(share, abs=0.03)
     assert sum(s.touched[0, 0, 0] for s in states) == 1
@@ -112,7 +111,7 @@ def test_walls_and_paddles_return_their_share(puck, speed, share):
 
 def test_drag_and_friction_are_those_of_the_other_backends():
     bench = Bench("robosuite", {"puck_damping": 0.8}, blocks=1)
-    bench.start((-0.7, 0.2), (-0.3, 0.0, 0.5, 0.0), (0.0, 0.2, 0.6, 0.0))
+    bench.reset((-0.7, 0.2), (-0.3, 0.0, 0.5, 0.0), (0.0, 0.2, 0.6, 0.0))
     states = bench.run(1.0)
     np.testing.assert_allclose(
         states[-1].puck_velocity[0, 0, 0], 0.5 * np.exp(-0.8), rtol=5e-3
@@ -128,7 +127,7 @@ def test_nothing_escapes():
     for _ in range(200):
         angle, at = rng.uniform(0, 2 * np.pi), rng.uniform(-0.2, 0.2, 2)
         way = 5 * np.cos(angle), 5 * np.sin(angle)
-        bench.start((-0.6, 0.0), (*at, *way))
+        bench.reset((-0.6, 0.0), (*at, *way))
         for state in bench.run(0.5):
             x, y = np.abs(state.path[0, :, 1, :2]).max(0)
             assert x < 0.8382
@@ -169,7 +168,7 @@ def test_robosuites_own_steps_are_the_same():
     env.reset()
     env.surface.set_physics(FLAT)
     home = env.hands[0].home
-    bench.start(home, (-0.3, 0.02, 0.0, 0.0))
+    bench.reset(home, (-0.3, 0.02, 0.0, 0.0))
     data, own = env.sim.data._data, bench.backend.worlds[0].data
     data.qpos[:], data.qvel[:] = own.qpos, own.qvel
     env.sim.forward()
@@ -177,8 +176,7 @@ def test_robosuites_own_steps_are_the_same():
     furthest = 0.0
     for _ in range(40):
         env.step(rng.uniform(-1, 1, 2))
-        command = env.hands[0].new[None, None]
-        state = bench.backend.step(Command(command))
+        state = bench.backend.step(bench.command(env.hands[0].new))
         way = env.hands[0]
         mujoco.mj_kinematics(env.sim.model._model, data)
         furthest = max(furthest, np.abs(way.position[:2] - state.paddle[0, 0]).max())
@@ -247,7 +245,7 @@ def test_workers_change_nothing(monkeypatch):
 def test_the_law_does_not_know_of_a_payload():
     bench = Bench("robosuite")
     world, mass = bench.backend.worlds[0], {}
-    bench.start((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
+    bench.reset((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
     for load in (0.0, 0.6):
         world.set_physics(FLAT | {"arm_payload": load})
         first = world.sim.arms[0, 1]
@@ -307,16 +305,16 @@ def test_it_is_seen_from_three_cameras():
 
 
 def test_a_person_moves_an_arm():
-    court = Court("juggle", {}, {"backend": "robosuite"}, seed=0)
-    session = Session(court)
-    guest = session.join()
-    session.hear(guest, line("hello", key="k"))
-    session.hear(guest, aim(-0.5, 0.15))
-    session.hear(guest, line("start"))
+    match = LiveMatch("juggle", {}, {"backend": "robosuite"}, seed=0)
+    session = Session(match)
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session.receive(client, aim(-0.5, 0.15))
+    session.receive(client, line("start"))
     for _ in range(5 * RATE):
         session.tick()
-    np.testing.assert_allclose(court.world.state.paddle[0, 0], (-0.5, 0.15), atol=0.01)
-    court.close()
+    np.testing.assert_allclose(match.world.state.paddle[0, 0], (-0.5, 0.15), atol=0.01)
+    match.close()
 
 
 def test_what_is_missing_is_named_with_its_fix(monkeypatch):

@@ -43,13 +43,10 @@ def test_it_plays_both_ends_alike(agent):
         worlds[me].reset(1)
     near, far = worlds[0], worlds[1]
     # Turn the far world's start by half a turn; seats then swap.
-    flipped = near.state.map(np.copy)
+    flipped, everywhere = near.state, np.arange(3)
     for name in ("position", "velocity"):
-        turned = -getattr(near.state, name)
-        getattr(flipped, name)[:] = turned[:, [1, 0, 2]]
-    everywhere = np.arange(3)
-    far._place(everywhere, flipped, far.memory)
-    far._sensed = far._look(everywhere)
+        getattr(flipped, name)[:] = -getattr(near.state, name)[:, [1, 0, 2]]
+    far.set_state(flipped)
     for world, seat in ((near, 0), (far, 1)):
         world.driven[seat]._rng.renew(everywhere, near.seeds, near.seeds, "same")
     for _ in range(40):

@@ -21,6 +21,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
+from marl_airhockey.contracts.scenario import Transition
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import gymnasium_id
 
@@ -191,7 +192,7 @@ def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
 
     paths = [s.path for s in states if s.path is not None]
     names = ("position", "velocity", "angle", "spin", "touched", "touched_at")
-    names += ("touching", "crossed", "crossed_velocity", "visible", "time")
+    names += ("touching", "banked", "crossed", "crossed_velocity", "visible", "time")
     path = np.stack([paths[0], *paths]) if paths else None
     recording = type(states[1])(
         game.scene.bodies, *(stack(name) for name in names), path=path
@@ -203,7 +204,8 @@ def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
     )
     old = {k: v[:-1] for k, v in memory.items()}
     new = {k: v[1:] for k, v in memory.items()}
-    terms = game.all_reward_terms(before, command, after, old, new)
+    never = np.zeros(after.time.shape, bool)
+    terms = game.all_reward_terms(Transition(before, command, after, old, new, never))
     np.testing.assert_allclose(sum(terms.values()), rewards, atol=1e-12)
     for name, value in world.memory.items():
         # The loop's exp and numpy's differ in the last digit.

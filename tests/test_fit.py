@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from marl_airhockey.core.physics import load_physics
-from marl_airhockey.play.live_match import RATE, Court
+from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.session import Session
 from marl_airhockey.registry import make_agent
@@ -47,11 +47,11 @@ def test_an_arm_is_nearer_to_the_fitted_table():
 
 def test_recordings_are_fitted_to(tmp_path):
     seats = {"paddle_0": "striker"}
-    court = Court("juggle", seats, {"physics": OTHER}, seed=0)
-    session = Session(court, Recorder(tmp_path))
+    match = LiveMatch("juggle", seats, {"physics": OTHER}, seed=0)
+    session = Session(match, Recorder(tmp_path))
     for _ in range(6):
-        court.start()
-        while court.phase != "done":
+        match.start()
+        while match.phase != "done":
             session.tick()
         session.tick()
     seen = load_recordings(sorted(tmp_path.glob("*.jsonl")))

@@ -27,13 +27,12 @@ def test_a_driven_seat_makes_it_a_single_agent_environment():
 
 def mirrored(world):
     """The same worlds, seen from the other end."""
-    turned = world.state.map(np.copy)
+    flipped = world.state
     for name in ("position", "velocity"):
-        getattr(turned, name)[:] = -getattr(world.state, name)[:, [1, 0, 2]]
+        getattr(flipped, name)[:] = -getattr(world.state, name)[:, [1, 0, 2]]
     other = ah.make_world(Pair(), world.num_worlds)
     other.reset(0)
-    other._place(np.arange(world.num_worlds), turned, other.memory)
-    other._sensed = other._look(np.arange(world.num_worlds))
+    other.set_state(flipped)
     return other
 
 
@@ -87,17 +86,18 @@ def test_opponents_are_seen_from_ones_own_end():
     np.testing.assert_allclose(seen[0, 1, own], [-0.5, 0.0], atol=1e-6)
     np.testing.assert_allclose(
         seen[0, :, other],
-        0.5 * np.eye(2)[[0, 1]][:, :1] * 0 + [[0.5, 0.5], [0.0, 0.0]],
+        [[0.5, 0.5], [0.0, 0.0]],
         atol=1e-6,
     )
 
 
-def place_puck(world, x, y, vx=0.0, vy=0.0):
-    """Put puck 0 of every world somewhere."""
-    rows = world.state.map(np.copy)
+def place_puck(world, x, y, vx=0.0, vy=0.0, **memory):
+    """Put puck 0 of every world somewhere, with something else in the memory."""
+    rows, kept = world.get_state()
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (x, y), (vx, vy)
-    world._place(np.arange(world.num_worlds), rows, world.memory)
-    world._sensed = world._look(np.arange(world.num_worlds))
+    for name, value in memory.items():
+        kept[name][:] = value
+    world.set_state(rows, kept)
 
 
 def idle(world, seconds):
@@ -166,17 +166,17 @@ def test_a_turned_game_gives_turned_rewards(name, backend):
         world.autoreset = False
         world.reset(0)
     seats = len(worlds[0].open)
-    turn, shift = 2 * np.pi / turns, seats // turns
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    angle, shift = 2 * np.pi / turns, seats // turns
+    c, s = np.cos(angle), np.sin(angle)
+    rotation = np.array([[c, -s], [s, c]])
     rng = np.random.default_rng(0)
     angle = rng.uniform(-np.pi, np.pi, count)
     launch = np.stack([np.cos(angle), np.sin(angle)], -1)
     for world, matrix in zip(worlds, (np.eye(2), rotation), strict=True):
-        rows = world.state.map(np.copy)
+        rows = world.state
         rows.puck[:, 0] = 0.2 * launch @ matrix.T
         rows.puck_velocity[:, 0] = 2.0 * launch[:, ::-1] @ matrix.T
-        world._place(np.arange(count), rows, world.memory)
-        world._sensed = world._look()
+        world.set_state(rows, world.memory)
     paid = np.zeros(count, bool)
     for _ in range(30):
         action = rng.uniform(-1, 1, (count, seats, 2))
@@ -185,8 +185,8 @@ def test_a_turned_game_gives_turned_rewards(name, backend):
         live = ~paid & ~one.terminated
         # A goal is served again with luck of its own, so that is where it ends.
         paid |= (one.reward != 0).any(-1)
-        turned = np.roll(one.reward, shift, axis=1)
-        np.testing.assert_allclose(turned[live], two.reward[live], atol=1e-9)
+        rolled = np.roll(one.reward, shift, axis=1)
+        np.testing.assert_allclose(rolled[live], two.reward[live], atol=1e-9)
         np.testing.assert_array_equal(one.terminated[live], two.terminated[live])
     assert paid.sum() > 5
 
@@ -210,12 +210,12 @@ def test_what_one_team_wins_the_other_loses(name, backend):
 def test_two_pucks_are_served_apart_and_both_count(backend):
     world = ah.make_world("duel", 4, backend=backend, options={"pucks": 2})
     world.reset(0)
-    rows = world.state.map(np.copy)
+    rows = world.state
     rows.puck[:], rows.puck_velocity[:] = (
         [(0.75, 0.06), (-0.75, 0.06)],
         [(2, 0), (-2, 0)],
     )
-    world._place(np.arange(4), rows, world.memory)
+    world.set_state(rows, world.memory)
     idle(world, 0.2)
     assert (world.memory["goals"] == 1).all()
     gap = world.state.puck[:, 0] - world.state.puck[:, 1]
@@ -277,10 +277,10 @@ def test_a_goal_pays_who_touched_the_puck_last(backend):
     world = ah.make_world("free_for_all", 2, backend=backend)
     world.reset(0)
     # Seat 0 pushes the puck across to side 2, whose paddle stands aside.
-    rows = world.state.map(np.copy)
+    rows = world.state
     rows.paddle[:, 0], rows.paddle[:, 2] = (-0.2, 0.0), (0.3, 0.3)
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (-0.1, 0.0), (0.0, 0.0)
-    world._place(np.arange(2), rows, world.memory)
+    world.set_state(rows, world.memory)
     action = np.zeros((2, 4, 2))
     total = np.zeros((2, 4))
     for step in range(20):
@@ -296,9 +296,8 @@ def test_a_rally_counts_crossings_by_turns(backend):
     place_puck(world, -0.2, 0.2, 1.0)
     assert not sum(s.reward for s in idle(world, 0.5)).any(), "nobody had struck it"
     for toucher, paid in ((1, 1.0), (1, 0.0), (2, 1.0), (1, 1.0)):
-        world._memory["toucher"][:] = toucher
-        way = 1.0 if toucher == 1 else -1.0
-        place_puck(world, -0.1 * way, 0.2, way)
+        heading = 1.0 if toucher == 1 else -1.0
+        place_puck(world, -0.1 * heading, 0.2, heading, toucher=toucher)
         reward = sum(s.reward for s in idle(world, 0.3))
         assert reward.tolist() == [[paid, paid]] * 2
     place_puck(world, -0.1, 0.2, 0.04)
@@ -310,9 +309,8 @@ def test_mates_are_paid_for_striking_in_turn(backend):
     world.autoreset = False
     world.reset(0)
     for striker, paid in ((1, 0.0), (2, 1.0), (2, 0.0), (1, 1.0)):
-        world._memory["armed"][:], world._memory["struck_at"][:] = 1.0, -0.5
-        world._memory["striker"][:] = striker
-        place_puck(world, -0.35, 0.0, 2.0)
+        lifted = {"armed": 1.0, "struck_at": -0.5, "striker": striker}
+        place_puck(world, -0.35, 0.0, 2.0, **lifted)
         terms = [s.terms["pass"] for s in idle(world, 0.1)]
         assert sum(terms).tolist() == [[paid, paid]] * 2
     assert (world.memory["passes"] == 2).all()

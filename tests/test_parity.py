@@ -9,7 +9,6 @@ from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES, Table
 from marl_airhockey.registry import find_backend
-from marl_airhockey.toolkit.starts import first_state
 
 TABLE = TABLES["standard"]
 DT = 0.05
@@ -17,7 +16,7 @@ RNG = np.random.default_rng(0)
 PADDLE, PUCK = TABLE.paddle_radius, TABLE.puck_radius
 
 
-def play(scene, rows, seconds, command=None, **physics):
+def play(scene, rows, seconds, velocity=None, **physics):
     """States of both backends, {name: (T, ...) states}, from ``rows`` (B, N, 4)."""
     values = {name: p.default for name, p in PARAMETERS.items()}
     values.update({"tilt": 0.0, "puck_damping": 0.0} | physics)
@@ -27,16 +26,14 @@ def play(scene, rows, seconds, command=None, **physics):
         backend = find_backend(name)(scene, worlds, DT, 10)
         arrays = {k: np.full(worlds, v) for k, v in values.items()}
         backend.set_physics(arrays, np.arange(worlds))
-        state = first_state(scene, worlds)
+        state = scene.still_state(worlds)
         movers = scene.bodies.movers
         state.position[:, :movers] = rows[..., :2]
         state.velocity[:, :movers] = rows[..., 2:]
-        backend.start(state, np.arange(worlds))
-        command = np.zeros((worlds, scene.bodies.paddles, 2))
-        command = command if command is None else command
-        found[name] = [
-            backend.step(Command(command)) for _ in range(round(seconds / DT))
-        ]
+        backend.reset(state, np.arange(worlds))
+        still = Command.still(scene, worlds)
+        order = still if velocity is None else still._replace(velocity=velocity)
+        found[name] = [backend.step(order) for _ in range(round(seconds / DT))]
     return found["pymunk"], found["numba"]
 
 
@@ -49,7 +46,7 @@ def bodies(worlds, *others):
     return rows
 
 
-def scene(**options):
+def table_with(**options):
     return Scene(TABLE, (make_seat("robot", TABLE, 0),), **{"pucks": 1} | options)
 
 
@@ -83,7 +80,7 @@ def test_free_flight_and_banks_agree_to_a_millimetre_over_two_seconds(tilt, damp
         ),
     )
     rows[:, 0, :2] = (-0.78, 0.25)
-    pair = play(scene(), rows, 2.0, tilt=tilt, puck_damping=damping)
+    pair = play(table_with(), rows, 2.0, tilt=tilt, puck_damping=damping)
     alone = ~np.any([s.touched.any((1, 2)) for s in pair[0]], axis=0)
     assert alone.mean() > 0.7
     for a, b in zip(*pair, strict=True):
@@ -104,7 +101,7 @@ def test_a_puck_and_a_paddle_at_all_angles_and_speeds(moving):
     if moving:
         pace = RNG.uniform(0, 0.35, worlds)
         command[:, 0] = polar(pace, RNG.uniform(0, 2 * np.pi, worlds))
-    pymunk, batched = play(scene(), rows, 0.35, command)
+    pymunk, batched = play(table_with(), rows, 0.35, command)
     assert np.mean(np.any([s.touched.any((1, 2)) for s in pymunk], axis=0)) > 0.8
     same_outcome(pymunk, batched)
 
@@ -116,7 +113,7 @@ def test_a_puck_strikes_a_block_head_on_and_glancing():
     puck[:, 1], puck[:, 2] = off * reach, RNG.uniform(0.3, 4.0, worlds)
     puck[:, 0] = -np.sqrt(reach**2 - puck[:, 1] ** 2) - 0.003
     rows = bodies(worlds, puck, (0.0, 0.0, 0.0, 0.0))
-    pymunk, batched = play(scene(blocks=1), rows, 0.05)
+    pymunk, batched = play(table_with(blocks=1), rows, 0.05)
     assert (np.linalg.norm(pymunk[-1].block_velocity, axis=-1) > 0).mean() > 0.9
     same_outcome(pymunk, batched)
 
@@ -128,7 +125,7 @@ def test_two_pucks_meet():
     first[:, 1], first[:, 2] = off * 2 * PUCK, RNG.uniform(0.3, 3.0, worlds)
     second[:, 0], second[:, 2] = 0.15, RNG.uniform(-2.0, 0.2, worlds)
     rows = bodies(worlds, first, second)
-    same_outcome(*play(scene(pucks=2), rows, 0.2))
+    same_outcome(*play(table_with(pucks=2), rows, 0.2))
 
 
 def test_a_puck_in_a_corner():
@@ -136,12 +133,12 @@ def test_a_puck_in_a_corner():
     angle, speed = RNG.uniform(0.05, 1.52, worlds), RNG.uniform(0.3, 4.0, worlds)
     start = np.array([0.75, 0.22]) + RNG.uniform(-0.03, 0.03, (worlds, 2))
     rows = bodies(worlds, np.concatenate([start, polar(speed, angle)], -1))
-    same_outcome(*play(scene(), rows, 0.3))
+    same_outcome(*play(table_with(), rows, 0.3))
 
 
 def test_a_puck_at_a_goal_post_and_through_the_mouth():
     worlds = 400
-    goal = scene(goal_lines=(GoalLine("far", 2, 0.30), GoalLine("home", 0)))
+    goal = table_with(goal_lines=(GoalLine("far", 2, 0.30), GoalLine("home", 0)))
     puck = np.zeros((worlds, 4))
     puck[:, 0], puck[:, 1] = 0.65, RNG.uniform(0.10, 0.20, worlds)
     puck[:, 2], puck[:, 3] = RNG.uniform(0.8, 3.0, worlds), RNG.uniform(-1, 1, worlds)
@@ -160,7 +157,7 @@ def test_a_puck_at_obstacles():
     posts = (Obstacle((0.2, 0.05), 0.05), Obstacle((0.1, -0.2), 0.01, (0.3, -0.1)))
     puck = np.zeros((worlds, 4))
     puck[:, 1], puck[:, 2] = RNG.uniform(-0.25, 0.25, worlds), 1.5
-    same_outcome(*play(scene(obstacles=posts), bodies(worlds, puck), 0.25))
+    same_outcome(*play(table_with(obstacles=posts), bodies(worlds, puck), 0.25))
 
 
 def test_a_puck_on_a_pentagon_away_from_its_corners():

@@ -1,180 +1,66 @@
-"""Studies: plans and orders, a way through one, what is kept and what is erased."""
+"""Studies: a course through a plan, what is kept and what is erased."""
 
-import itertools
 import json
 import time
-from collections import Counter
 
 import pytest
-from pages import aim, line, page_at, running, wait
+from pages import aim, line
+from study_steps import PLAN, answer, consent, enter, plan_writer, play, stage
 
 from marl_airhockey.evaluation.recordings import head
 from marl_airhockey.play.live_match import RATE
-from marl_airhockey.play.report import report
+from marl_airhockey.play.report import summarize
 from marl_airhockey.play.session import GONE, GRACE, IDLE
+from marl_airhockey.study.admission import ABSENT
 from marl_airhockey.study.answers import read_answers
-from marl_airhockey.study.archive import claim, diaries, erase
-from marl_airhockey.study.plan import EXAMPLE, Opponent, Plan, load
-from marl_airhockey.study.study import ABSENT, Study
-
-PLAN = """
-scenario = "duel"
-version = "3"
-information = "First.\\n\\nSecond."
-agree = ["Yes."]
-opponents = ["still", {name = "striker", reaction = 100}]
-games = 1
-practice = 1
-practice_opponent = "still"
-rest = 0
-questions = ["origin", {id = "fun", text = "Fun?"}]
-[options]
-seconds = 1.0
-"""
+from marl_airhockey.study.archive import diaries, erase
+from marl_airhockey.study.study import Study
 
 
 @pytest.fixture
 def plan(tmp_path):
-    def write(text=PLAN):
-        path = tmp_path / "plan.toml"
-        path.write_text(text)
-        return load(path)
-
-    return write
-
-
-def enter(study, key):
-    guest = study.join()
-    study.hear(guest, line("hello", key=key))
-    study.tick()
-    return guest
-
-
-def stage(study, guest):
-    study.tick()
-    guest.meter._level = 100.0
-    return json.loads(guest.frame)["study"]
-
-
-def consent(study, guest):
-    study.hear(guest, line("consent", version="3"))
-
-
-def play(study, guest):
-    study.hear(guest, line("start"))
-    study.tick()
-    assert study.court.phase == "countdown"
-    while study.court.phase != "done":
-        study.tick()
-    assert stage(study, guest)["stage"] == "over"
-    for _ in range(3 * RATE):
-        study.tick()
-
-
-def answer(study, guest, fun=5):
-    study.hear(guest, line("answer", question="origin", value=2))
-    study.hear(guest, line("answer", question="fun", value=fun))
-
-
-@pytest.mark.parametrize("count", range(1, 9))
-def test_each_opponent_comes_after_each_other_equally_often(count):
-    plan = Plan(
-        "duel",
-        "text",
-        ("yes",),
-        "1",
-        opponents=tuple(map(Opponent, "abcdefgh"[:count])),
-    )
-    rows = [plan.sequence(k) for k in range(count if count % 2 == 0 else 2 * count)]
-    assert all(sorted(row) == list(range(count)) for row in rows)
-    for place in range(count):
-        assert len(set(Counter(row[place] for row in rows).values())) == 1
-    after = Counter(pair for row in rows for pair in itertools.pairwise(row))
-    assert len(after) == count * (count - 1)
-    assert len(set(after.values())) <= 1
-    assert plan.sequence(3) == plan.sequence(3 + len(rows))
-
-
-def test_the_order_can_be_drawn_or_fixed_and_follows_the_seed(plan):
-    fixed = plan(PLAN.replace("games = 1", 'games = 1\norder = "fixed"'))
-    assert [fixed.sequence(k) for k in range(4)] == [[0, 1]] * 4
-    drawn = plan(PLAN.replace("games = 1", 'games = 1\norder = "random"\nseed = 4'))
-    found = [drawn.sequence(k) for k in range(20)]
-    assert {tuple(row) for row in found} == {(0, 1), (1, 0)}
-    assert found == [drawn.sequence(k) for k in range(20)]
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "complaint"),
-    [
-        ('version = "3"', "", "lacks.*version"),
-        ('version = "3"', "version = 3", "version: 3"),
-        ("games = 1", "games = 0", "games"),
-        ("games = 1", "games = true", "games: True"),
-        ("games = 1", "game = 1", "game: unknown"),
-        ("games = 1", 'order = "best"', "order: 'best'.*balanced, random, fixed"),
-        ('agree = ["Yes."]', "agree = []", "agree"),
-        ('agree = ["Yes."]', "agree = [1]", "agree: must be a list of texts"),
-        ('"still", {', '"striker (reaction 0.1)", {', "there twice"),
-        ("reaction = 100", "speed = 1", "speed: unknown; an opponent has"),
-        ('name = "striker"', 'label = "x"', "an opponent lacks 'name'|lacks.*name"),
-        ('id = "fun"', 'id = "Fun!"', "must be of a-z"),
-        ('text = "Fun?"', 'text = "Fun?", choices = ["x"]', "at least two"),
-        ("games = 1", 'digest = "x"', "digest: unknown"),
-        ('"origin"', '"mood"', "'mood' is not shipped"),
-        ("reaction = 100", "reaction = 900", "reaction"),
-        ('"still", {', '"nobody", {', "unknown driver"),
-        ('"still", {', '"zoo/juggle", {', "expects observations"),
-        ('{name = "striker"', '{name = "person"', "cannot be held back"),
-        ('scenario = "duel"', 'scenario = "juggle"', "needs no opponents"),
-        ("[options]", "[options", "no TOML"),
-    ],
-)
-def test_a_bad_plan_is_named(plan, tmp_path, old, new, complaint):
-    assert old in PLAN
-    with pytest.raises(ValueError, match=complaint):
-        Study(plan(PLAN.replace(old, new)), tmp_path / "out")
+    return plan_writer(tmp_path)
 
 
 def test_a_participant_goes_through_a_plan(plan, tmp_path):
     out = tmp_path / "out"
     study = Study(plan(), out)
-    guest, other = enter(study, "a"), enter(study, "b")
-    assert stage(study, guest) == {"stage": "consent"}
-    assert guest.seat is None
-    study.hear(guest, line("start"))
-    assert study.court.phase == "lobby"
+    client, other = enter(study, "a"), enter(study, "b")
+    assert stage(study, client) == {"stage": "consent"}
+    assert client.seat is None
+    study.receive(client, line("start"))
+    assert study.match.phase == "lobby"
     assert not list(out.rglob("*.jsonl")), "nothing is kept before the consent"
     with pytest.raises(ValueError, match="load the page again"):
-        study.hear(guest, line("consent", version="2"))
-    consent(study, guest)
+        study.receive(client, line("consent", version="2"))
+    consent(study, client)
     consent(study, other)
-    assert guest.seat == 0
+    assert client.seat == 0
     assert stage(study, other) == {"stage": "busy"}
-    assert stage(study, guest)["block"] == -1
-    code = stage(study, guest)["code"]
-    play(study, guest)  # practice
+    assert stage(study, client)["block"] == -1
+    code = stage(study, client)["code"]
+    play(study, client)  # practice
     seen = []
     for block in range(2):
-        assert stage(study, guest)["stage"] == "ready"
-        state = json.loads(guest.frame)
+        assert stage(study, client)["stage"] == "ready"
+        state = json.loads(client.frame)
         assert state["study"]["block"] == block
         assert state["seats"][1] == {
-            "who": f"Opponent {block + 1}",
+            "driver": f"Opponent {block + 1}",
             "taken": True,
             "title": f"Opponent {block + 1}",
         }
-        assert state["strength"] == ""
-        seen.append(study.court.who[1])
-        play(study, guest)
-        assert stage(study, guest)["stage"] == "questions"
+        assert state["handicap"] == ""
+        seen.append(study.match.drivers.names[1])
+        play(study, client)
+        assert stage(study, client)["stage"] == "questions"
         with pytest.raises(ValueError, match="fun 8"):
-            study.hear(guest, line("answer", question="fun", value=8))
-        answer(study, guest, fun=block + 3)
+            study.receive(client, line("answer", question="fun", value=8))
+        answer(study, client, fun=block + 3)
     assert sorted(seen) == ["still", "striker"]
-    assert stage(study, guest)["stage"] == "end"
+    assert stage(study, client)["stage"] == "end"
     texts = json.dumps(study.describe())
-    assert "striker" not in texts, "who is met stays with the leader"
+    assert "striker" not in texts, "who is played stays with the leader"
     (found,) = diaries(out)
     assert [row["kind"] for row in found.rows] == [
         *("diary", "consent", "game", "game", "answer", "answer"),
@@ -185,17 +71,20 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     assert [meta["study"]["practice"] for meta in metas] == [True, False, False]
     assert metas[1]["players"][0]["person"] == code
     assert metas[1]["players"][0]["consent"] == "3"
-    sums = report(out)
+    sums = summarize(out)
     assert sums.episodes == 2, "practice does not count"
     assert "striker (reaction 0.1)" in sums.players
-    asked = read_answers(out)
-    assert (asked.participants, asked.complete) == (1, 1)
-    assert [row["practice"] for row in asked.games] == [True, False, False]
-    assert {row["value"] for row in asked.answers if row["question"] == "fun"} == {3, 4}
-    files = asked.save(tmp_path / "sums")
+    answers = read_answers(out)
+    assert (answers.participants, answers.complete) == (1, 1)
+    assert [row["practice"] for row in answers.games] == [True, False, False]
+    assert {row["value"] for row in answers.answers if row["question"] == "fun"} == {
+        3,
+        4,
+    }
+    files = answers.save(tmp_path / "sums")
     assert files[0].read_text().count("\n") == 4
     assert all(path.stat().st_size > 50 for path in files)
-    study.hear(guest, line("next"))
+    study.receive(client, line("next"))
     assert stage(study, other)["stage"] == "consent"
 
 
@@ -204,11 +93,11 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     study = Study(plan(), out)
     first = enter(study, "a")
     consent(study, first)
-    study.hear(first, line("start"))
+    study.receive(first, line("start"))
     for _ in range(round(3.5 * RATE)):
         study.tick()
     assert list(out.rglob("*duel.jsonl"))
-    study.hear(first, line("withdraw"))
+    study.receive(first, line("withdraw"))
     assert stage(study, first) == {"stage": "erased"}
     assert not list(out.rglob("*duel.jsonl"))
     (line_left,) = (out / "erased.jsonl").read_text().splitlines()
@@ -225,7 +114,7 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     assert not list(diaries(out))
 
 
-def test_people_meet_and_either_can_withdraw(plan, tmp_path):
+def test_people_play_each_other_and_either_can_withdraw(plan, tmp_path):
     text = PLAN.replace('"still", {name = "striker", reaction = 100}', '"person"')
     out = tmp_path / "out"
     study = Study(plan(text), out)
@@ -233,8 +122,8 @@ def test_people_meet_and_either_can_withdraw(plan, tmp_path):
     consent(study, subject)
     play(study, subject)
     assert stage(study, subject)["waits"], "the other one has not agreed yet"
-    study.hear(subject, line("start"))
-    assert study.court.phase != "countdown"
+    study.receive(subject, line("start"))
+    assert study.match.phase != "countdown"
     assert stage(study, partner) == {"stage": "consent"}
     consent(study, partner)
     assert stage(study, partner)["stage"] == "partner"
@@ -244,7 +133,7 @@ def test_people_meet_and_either_can_withdraw(plan, tmp_path):
     answer(study, subject)
     games = [p for p in out.rglob("*duel.jsonl") if not head(p)["study"]["practice"]]
     assert [row["consent"] for row in head(games[0])["players"]] == ["3", "3"]
-    study.hear(partner, line("withdraw"))
+    study.receive(partner, line("withdraw"))
     assert not games[0].exists()
     assert stage(study, subject)["stage"] == "end"
     assert len(list(diaries(out))) == 1
@@ -252,31 +141,31 @@ def test_people_meet_and_either_can_withdraw(plan, tmp_path):
 
 def test_a_participant_who_goes_may_come_back_or_is_given_up(plan, tmp_path):
     study = Study(plan(), tmp_path / "out")
-    guest = enter(study, "a")
-    consent(study, guest)
-    study.hear(guest, line("start"))
+    client = enter(study, "a")
+    consent(study, client)
+    study.receive(client, line("start"))
     for _ in range(round(3.5 * RATE)):
         study.tick()
-    study.part(guest)
-    assert (study.court.phase, study.court.reason) == ("pause", GONE)
+    study.disconnect(client)
+    assert (study.match.phase, study.match.reason) == ("pause", GONE)
     back = enter(study, "a")
     assert back.seat == 0
-    assert study.court.phase == "countdown"
+    assert study.match.phase == "countdown"
     twin = enter(study, "a")
     assert twin.seat is None, "the same page twice"
-    study._let_go(time.monotonic() + IDLE + 1)
-    assert study.court.phase == "pause"
+    study._check_presence(time.monotonic() + IDLE + 1)
+    assert study.match.phase == "pause"
     assert back.seat == 0, "who thinks keeps the seat"
-    study.part(twin)
-    study.part(back)
-    study._let_go(time.monotonic() + IDLE + ABSENT + 2)
-    assert study.subject is None
+    study.disconnect(twin)
+    study.disconnect(back)
+    study._check_presence(time.monotonic() + IDLE + ABSENT + 2)
+    assert study.participant is None
     (diary,) = diaries(tmp_path / "out")
     assert diary.rows[-1]["reason"] == "left"
     other = enter(study, "b")
     assert stage(study, other) == {"stage": "consent"}
     consent(study, other)
-    study.hear(other, aim(-0.4, 0.0))
+    study.receive(other, aim(-0.4, 0.0))
     play(study, other)
     found = list(diaries(tmp_path / "out"))
     assert {diary.rows[0]["role"] for diary in found} == {"participant"}
@@ -286,55 +175,44 @@ def test_a_participant_who_goes_may_come_back_or_is_given_up(plan, tmp_path):
 def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
     out = tmp_path / "out"
     study = Study(plan(), out)
-    guest = enter(study, "a")
-    consent(study, guest)
-    code = stage(study, guest)["code"]
+    client = enter(study, "a")
+    consent(study, client)
+    code = stage(study, client)["code"]
     for _ in range(2):
-        play(study, guest)
-    answer(study, guest)
-    first = study.court.who[1]
+        play(study, client)
+    answer(study, client)
+    first = study.match.drivers.names[1]
     study = Study(plan(), out)
-    other, guest = enter(study, "b"), enter(study, "a")
+    other, client = enter(study, "b"), enter(study, "a")
     assert stage(study, other)["stage"] == "busy"
-    again = stage(study, guest)
+    again = stage(study, client)
     assert (again["code"], again["stage"], again["block"]) == (code, "ready", 1)
-    assert study.court.who[1] == first, "the second opponent, as before"
-    play(study, guest)
+    assert study.match.drivers.names[1] == first, "the second opponent, as before"
+    play(study, client)
     study = Study(plan(), out)
-    guest = enter(study, "a")
-    while stage(study, guest)["stage"] == "over":
+    client = enter(study, "a")
+    while stage(study, client)["stage"] == "over":
         pass
-    assert stage(study, guest)["stage"] == "questions"
-    answer(study, guest)
-    assert stage(study, guest)["stage"] == "end"
-    study.part(guest)
-    study._let_go(time.monotonic() + GRACE + 1)
-    assert study.subject is None, "who is through lets the next one in"
-    asked = read_answers(out)
-    assert (asked.participants, asked.complete, len(asked.answers)) == (1, 1, 4)
-    assert {row["choice"] for row in asked.answers} == {"a program", ""}
-    assert {row["question"] for row in asked.table()} == {"origin: a program", "fun"}
+    assert stage(study, client)["stage"] == "questions"
+    answer(study, client)
+    assert stage(study, client)["stage"] == "end"
+    study.disconnect(client)
+    study._check_presence(time.monotonic() + GRACE + 1)
+    assert study.participant is None, "who is through lets the next one in"
+    answers = read_answers(out)
+    assert (answers.participants, answers.complete, len(answers.answers)) == (1, 1, 4)
+    assert {row["choice"] for row in answers.answers} == {"a program", ""}
+    assert {row["question"] for row in answers.table()} == {"origin: a program", "fun"}
 
 
 def test_whom_the_leader_erases_is_out(plan, tmp_path):
     study = Study(plan(), tmp_path / "out")
-    guest = enter(study, "a")
-    consent(study, guest)
-    erase(tmp_path / "out", stage(study, guest)["code"])
-    study.hear(guest, line("start"))
-    assert stage(study, guest) == {"stage": "erased"}
+    client = enter(study, "a")
+    consent(study, client)
+    erase(tmp_path / "out", stage(study, client)["code"])
+    study.receive(client, line("start"))
+    assert stage(study, client) == {"stage": "erased"}
     consent(study, enter(study, "b"))
-
-
-def test_a_folder_is_that_of_one_plan(plan, tmp_path):
-    plan()
-    claim(tmp_path / "out", tmp_path / "plan.toml")
-    claim(tmp_path / "out", tmp_path / "plan.toml")
-    plan(PLAN.replace("games = 1", "games = 2"))
-    with pytest.raises(ValueError, match="another plan"):
-        claim(tmp_path / "out", tmp_path / "plan.toml")
-    with pytest.raises(ValueError, match=r"--out .*exists"):
-        claim(tmp_path / "plan.toml", tmp_path / "plan.toml")
 
 
 def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
@@ -344,63 +222,21 @@ def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
         .replace("practice = 1", "practice = 0")
     )
     study = Study(plan(text), tmp_path / "a")
-    guest = enter(study, "a")
-    consent(study, guest)
-    play(study, guest)
-    answer(study, guest)
-    assert stage(study, guest)["stage"] == "end"
+    client = enter(study, "a")
+    consent(study, client)
+    play(study, client)
+    answer(study, client)
+    assert stage(study, client)["stage"] == "end"
     assert read_answers(tmp_path / "a").games[0]["result"] in ("won", "lost")
     study = Study(plan(PLAN.replace("rest = 0", "rest = 50")), tmp_path / "b")
-    guest = enter(study, "a")
-    consent(study, guest)
-    play(study, guest)
-    play(study, guest)
-    answer(study, guest)
-    assert stage(study, guest)["stage"] == "rest"
-    study.hear(guest, line("start"))
-    assert study.court.phase != "countdown"
+    client = enter(study, "a")
+    consent(study, client)
+    play(study, client)
+    play(study, client)
+    answer(study, client)
+    assert stage(study, client)["stage"] == "rest"
+    study.receive(client, line("start"))
+    assert study.match.phase != "countdown"
     for _ in range(50 * RATE):
         study.tick()
-    assert stage(study, guest)["stage"] == "ready"
-
-
-def test_the_example_is_a_plan():
-    assert load(EXAMPLE).blocks == 3
-
-
-def test_a_participant_in_the_browser(browser, plan, tmp_path):
-    plan(PLAN)
-    complaints = []
-    words = ("study", "run", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "o"))
-    with running(*words, "--port", "0", "--no-browser") as (address, _):
-        page = page_at(browser, address, complaints)
-        go = page.get_by_role("button", name="Take part")
-        assert go.is_disabled()
-        page.get_by_role("checkbox").check()
-        go.click()
-        for _ in range(2):
-            wait(page, "s.study.stage === 'ready'")
-            page.locator("#go").click()
-            wait(page, "s.phase === 'play'")
-            page.keyboard.down("ArrowUp")
-            wait(page, "s.pads[0][1] > 0.1 || s.phase === 'done'")
-            page.keyboard.up("ArrowUp")
-        wait(page, "s.study.stage === 'questions'")
-        page.get_by_label("a program").check()
-        page.reload()
-        page.get_by_label("a program").check()
-        go = page.get_by_role("button", name="Go on")
-        assert go.is_disabled()
-        page.get_by_label("6", exact=True).check()
-        go.click()
-        wait(page, "s.study.stage === 'ready' && s.study.block === 1")
-        page.get_by_role("button", name="Withdraw").click()
-        page.get_by_role("button", name="Stay").click()
-        page.get_by_role("button", name="Withdraw").click()
-        page.get_by_role("button", name="Erase everything").click()
-        wait(page, "s.study.stage === 'erased'")
-        page.get_by_role("button", name="Next participant").click()
-        page.get_by_role("button", name="Take part").wait_for()
-        page.close()
-    assert not complaints
-    assert [p.name for p in (tmp_path / "o").rglob("*.jsonl")] == ["erased.jsonl"]
+    assert stage(study, client)["stage"] == "ready"

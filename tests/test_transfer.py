@@ -79,7 +79,7 @@ def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
         (folder / "config.toml").touch()
         raise RuntimeError("cut off")
 
-    monkeypatch.setattr("marl_airhockey.cli.transfer.train_shown", train)
+    monkeypatch.setattr("marl_airhockey.cli.transfer.train_with_progress", train)
     for _ in range(2):
         with pytest.raises(RuntimeError, match="cut off"):
             app(ask, standalone_mode=False)

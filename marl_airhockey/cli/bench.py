@@ -1,4 +1,4 @@
-"""Bench: see the definitions."""
+"""Command ``airhockey bench``."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ def bench_environments(
     worlds: Annotated[
         str, typer.Option(help="Comma-separated; 0 is the PettingZoo dict environment.")
     ] = "0,1,64,1024,4096",
-    rounds: Annotated[int, typer.Option(help="Turns.")] = 3,
-    seconds: Annotated[float, typer.Option(help="CPU-seconds of a turn.")] = 1.0,
+    rounds: Annotated[int, typer.Option(help="Rounds; each measures every case.")] = 3,
+    seconds: Annotated[
+        float, typer.Option(help="CPU-seconds of a case in a round.")
+    ] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Draw a PNG here.")] = None,
     num_workers: Workers = None,
     as_json: AsJson = False,
@@ -57,7 +59,7 @@ def bench_environments(
         console.print_json(json.dumps([rate.to_json() for rate in rates]))
         return
     table = Table(
-        title=f"{rounds} turns of {seconds} CPU-s, {rates[0].threads} threads"
+        title=f"{rounds} rounds of {seconds} CPU-s, {rates[0].threads} threads"
     )
     for name in ("scenario", "backend", ""):
         table.add_column(name)

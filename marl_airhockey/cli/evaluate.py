@@ -1,4 +1,4 @@
-"""Evaluate: see the definitions."""
+"""Command ``airhockey evaluate``, and its table of results."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import Policy
 
 FLOORS = ("still", "random", "sticky")
+"""Drivers without skill that results are compared with."""
 
 
 @app.command("evaluate")
@@ -75,7 +76,7 @@ def evaluate_driver(
 
 
 def result_table(results: list[EvaluationResult]) -> Table:
-    """Results side by side, one column a driver."""
+    """Return a table with a column for each driver."""
     first = results[0]
     table = Table(
         title=f"{first.scenario} on {first.backend}, {first.profile} profile, "

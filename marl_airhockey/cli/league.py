@@ -1,4 +1,4 @@
-"""Commands for games: ``airhockey league``."""
+"""Command ``airhockey league``."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ SCRIPTS = (
         for strength in ("weak", "fair", "strong")
     ),
 )
+"""Scripts that play if no players are given."""
 
 
 def league(
@@ -58,7 +59,7 @@ def league(
     ] = 1,
     as_json: AsJson = False,
 ) -> None:
-    """Let everybody play everybody: ratings, matrix, circles."""
+    """Let everybody play everybody: ratings, matrix, circles of wins."""
     require("matplotlib", "train")
     names = list(players or ([] if folder else SCRIPTS))
     names += find_policies(folder) if folder else []
@@ -84,7 +85,7 @@ def league(
 
 
 def label(name: str, names: list[str]) -> str:
-    """A path by its end, as long as that is nobody else's."""
+    """Return the last two parts of a path, or the whole one if others end likewise."""
     short = "/".join(Path(name).parts[-2:])
     return short if sum(n.endswith(short) for n in names) == 1 else name
 
@@ -92,7 +93,18 @@ def label(name: str, names: list[str]) -> str:
 def best_responses(
     scenario: str, names: list[str], steps: int, seeds: int, out: Path
 ) -> dict[str, list[float]]:
-    """The scores of what learned to beat each player, in as many steps, by seed."""
+    """Train a best response to each player and return its scores, by player.
+
+    Args:
+        scenario: a game of two teams.
+        names: of the players.
+        steps: of training.
+        seeds: best responses to each player, of seeds 0 .. seeds - 1.
+        out: folder of the runs.
+
+    Returns:
+        Scores in the order of seeds.
+    """
     require("stable_baselines3", "train")
     from marl_airhockey.learn.best_response import best_response
 
@@ -109,7 +121,7 @@ def best_responses(
 
 
 def table(standings: Standings) -> Table:
-    """The league, the best first."""
+    """Return a table of the players, the best first."""
     shown = Table("player", "Elo", "95 %", "score", "won", "drawn", "lost", "goals")
     for row in standings.rows():
         shown.add_row(

@@ -1,4 +1,4 @@
-"""Listing: see the definitions."""
+"""Command ``airhockey list``."""
 
 from __future__ import annotations
 

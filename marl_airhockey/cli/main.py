@@ -1,4 +1,4 @@
-"""The command line: ``airhockey list | train | evaluate | watch | play | league``..."""
+"""Entry of the command line ``airhockey``; each module holds some commands."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from marl_airhockey.cli import (
 )
 from marl_airhockey.cli.options import app
 
-# Each of these defines its commands on the application.
+# Importing these modules adds their commands to the application.
 __all__ = ["bench", "evaluate", "listing", "main", "train", "watch"]
 app.command()(league.league)
 app.command()(play.play)

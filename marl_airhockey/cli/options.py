@@ -1,4 +1,4 @@
-"""What the commands share: the application, options, the progress bar."""
+"""Parts that commands share: the application, options, the progress bar."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ Drivers = Annotated[
 
 
 def settings(pairs: list[str] | None) -> dict[str, Any]:
-    """NAME=VALUE pairs; values as in TOML, bare words as strings.
+    """Return NAME=VALUE pairs as a dict; values as in TOML, bare words as strings.
 
     Raises:
         ValueError: a pair without "=".
@@ -76,7 +76,7 @@ def environment(
     driver: list[str] | None,
     physics: Path | None = None,
 ) -> Keywords:
-    """Keywords of an environment from the options that commands share."""
+    """Return an environment's keywords from the options that commands share."""
     return {
         "backend": backend,
         "profile": profile,
@@ -86,13 +86,13 @@ def environment(
     }
 
 
-def grade(row: dict[str, float]) -> str:
-    """What an evaluation in training says how good a policy is by."""
+def measure_of(row: dict[str, float]) -> str:
+    """Return the name of the measure in a row of training: "success" or "score"."""
     return "success" if "success" in row else "score"
 
 
 def bar() -> Progress:
-    """A progress bar on standard error, so that output can be piped."""
+    """Return a progress bar on standard error, so that output can be piped."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -103,15 +103,16 @@ def bar() -> Progress:
     )
 
 
-def train_shown(config: TrainConfig | None, folder: Path) -> Metrics:
-    """`learn.train.train` with a progress bar."""
+def train_with_progress(config: TrainConfig | None, folder: Path) -> Metrics:
+    """Call `learn.train.train` with a progress bar."""
     from marl_airhockey.learn.train import train
 
     with bar() as progress:
         task = progress.add_task(folder.name, total=None, note="")
 
         def report(done: int, total: int, row: dict[str, float]) -> None:
-            name = grade(row)
+            """Show the progress of training."""
+            name = measure_of(row)
             note = f"{name} {row[name]:.2f}" if row else ""
             progress.update(task, completed=done, total=total, note=note)
 

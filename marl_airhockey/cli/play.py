@@ -1,4 +1,4 @@
-"""The command ``airhockey play``: a table in the browser."""
+"""Commands ``airhockey play`` and ``airhockey record report``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,16 +21,42 @@ from marl_airhockey.cli.options import (
     settings,
 )
 from marl_airhockey.core.errors import require
+from marl_airhockey.play.handicap import BOUNDS, Handicap
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
 
-    from marl_airhockey.play.server import Door
+    from marl_airhockey.play.live_match import LiveMatch
+    from marl_airhockey.play.server import AccessCheck
 
 Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
 Port = Annotated[int, typer.Option(help="0 for a free one.", min=0, max=65535)]
 Browser = Annotated[bool, typer.Option(help="Open the page.")]
+Reaction = Annotated[
+    float,
+    typer.Option(
+        help="ms by which programs act late.",
+        min=1000.0 * BOUNDS["reaction"][0],
+        max=1000.0 * BOUNDS["reaction"][1],
+    ),
+]
+Noise = Annotated[
+    float,
+    typer.Option(
+        help="Noise on actions of programs, of top speed.",
+        min=BOUNDS["noise"][0],
+        max=BOUNDS["noise"][1],
+    ),
+]
+Pace = Annotated[
+    float,
+    typer.Option(
+        help="Largest speed of programs, of top speed.",
+        min=BOUNDS["pace"][0],
+        max=BOUNDS["pace"][1],
+    ),
+]
 
 
 def play(
@@ -46,22 +72,9 @@ def play(
     backend: Backend = "pymunk",
     profile: Profile = "ideal",
     option: Options = None,
-    reaction: Annotated[
-        float,
-        typer.Option(help="ms by which programs act late.", min=0.0, max=300.0),
-    ] = 0.0,
-    noise: Annotated[
-        float,
-        typer.Option(
-            help="Noise on what programs ask, of top speed.", min=0.0, max=1.0
-        ),
-    ] = 0.0,
-    pace: Annotated[
-        float,
-        typer.Option(
-            help="Largest speed of programs, of top speed.", min=0.05, max=1.0
-        ),
-    ] = 1.0,
+    reaction: Reaction = 1000.0 * Handicap.reaction,
+    noise: Noise = Handicap.noise,
+    pace: Pace = Handicap.pace,
     record: Annotated[
         Path | None, typer.Option(help="Write every episode into this folder.")
     ] = None,
@@ -72,8 +85,7 @@ def play(
     """Play against a policy, a script or each other in the browser."""
     require("starlette", "play")
     require("uvicorn", "play")
-    from marl_airhockey.play.handicap import Fairness
-    from marl_airhockey.play.live_match import PERSON, Court
+    from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.recorder import Recorder
     from marl_airhockey.play.server import application
     from marl_airhockey.play.session import Session
@@ -83,21 +95,40 @@ def play(
         "profile": profile,
         "options": settings(option),
     }
-    fairness = Fairness(reaction / 1000.0, noise, pace)
-    court = Court(scenario, {}, keywords, fairness)
-    rest = opponent or next(iter(court.house), "allround")
-    chosen = {str(k): str(v) for k, v in settings(seat).items()}
-    for i in range(len(court.who)):
-        agent = f"paddle_{i}"
-        court.seat(i, chosen.pop(agent, PERSON if i == 0 else rest))
-    if chosen:
-        raise ValueError(f"--seat: {scenario} has no {', '.join(chosen)}")
+    handicap = Handicap(reaction / 1000.0, noise, pace)
+    match = LiveMatch(scenario, {}, keywords, handicap)
+    _seat_drivers(match, opponent, settings(seat))
     with console.status("preparing the table (longer when it is the first time)"):
-        court.rehearse()
-    session = Session(court, Recorder(record) if record else None)
-    host_table(lambda door: application(session, door), scenario, host, port, browser)
+        match.warm_up()
+    session = Session(match, Recorder(record) if record else None)
+    host_table(
+        lambda access: application(session, access), scenario, host, port, browser
+    )
     if session.failure is not None:
         raise session.failure
+
+
+def _seat_drivers(
+    match: LiveMatch, opponent: str | None, seats: dict[str, Any]
+) -> None:
+    """Give each seat to its driver: a person at the first, opponents elsewhere.
+
+    Args:
+        match: before its start.
+        opponent: of all seats that are not chosen; None for a policy of the zoo that
+            fits, or else allround.
+        seats: chosen drivers, by agent.
+    """
+    from marl_airhockey.play.match_drivers import PERSON
+
+    rest = opponent or next(iter(match.drivers.fitting_policies), "allround")
+    chosen = {str(agent): str(name) for agent, name in seats.items()}
+    for i in range(len(match.seats)):
+        agent = f"paddle_{i}"
+        match.set_driver(i, chosen.pop(agent, PERSON if i == 0 else rest))
+    if chosen:
+        scenario = match.world.scenario.name
+        raise ValueError(f"--seat: {scenario} has no {', '.join(chosen)}")
 
 
 def show(recording: Path, host: str, port: int, browser: bool) -> None:
@@ -107,7 +138,7 @@ def show(recording: Path, host: str, port: int, browser: bool) -> None:
     from marl_airhockey.play.server import replay
 
     name = recording.name
-    host_table(lambda door: replay(recording, door), name, host, port, browser)
+    host_table(lambda access: replay(recording, access), name, host, port, browser)
 
 
 def report(
@@ -120,15 +151,19 @@ def report(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Sum recordings up: results, reactions, shots, limits; and a study's answers."""
+    """Summarize recordings: results, reactions, shots, limits, a study's answers."""
     require("matplotlib", "train")
-    from marl_airhockey.play.report import report as sum_up
+    from marl_airhockey.play.plots import plot_report
+    from marl_airhockey.play.report import summarize
     from marl_airhockey.study.answers import read_answers
 
-    found, asked = sum_up(folder, scenario), read_answers(folder)
+    found, answers = summarize(folder, scenario), read_answers(folder)
     files = found.save(out or folder)
-    if asked.participants:
-        files += asked.save(out or folder)
+    plot = (out or folder) / "report.png"
+    plot_report(found, plot)
+    files.append(plot)
+    if answers.participants:
+        files += answers.save(out or folder)
     if as_json:
         console.print_json(files[0].read_text())
         return
@@ -139,31 +174,43 @@ def report(
 
 
 def host_table(
-    make: Callable[[Door], Starlette], what: str, host: str, port: int, browser: bool
+    make: Callable[[AccessCheck], Starlette],
+    what: str,
+    host: str,
+    port: int,
+    browser: bool,
 ) -> None:
-    """Serve an application, say where, and open it."""
-    from marl_airhockey.play.server import Door, listen, serve
+    """Serve an application until interrupted, after printing its address.
 
-    door = Door(host)
-    app = make(door)
+    Args:
+        make: builds the application.
+        what: is served, for the printed line.
+        host: address to listen at.
+        port: to listen at; 0 for a free one.
+        browser: True to open the page.
+    """
+    from marl_airhockey.play.server import AccessCheck, listen, serve
+
+    access = AccessCheck(host)
+    app = make(access)
     server = listen(host, port)
-    address = f"http://{_shown(host)}:{server.getsockname()[1]}/"
-    if door.token:
-        address += f"?token={door.token}"
+    address = f"http://{_reachable(host)}:{server.getsockname()[1]}/"
+    if access.token:
+        address += f"?token={access.token}"
     console.print(f"{what} is at {address} (Ctrl-C ends it)", soft_wrap=True)
     if browser:
         threading.Timer(0.5, webbrowser.open, [address]).start()
     serve(app, server)
 
 
-def _shown(host: str) -> str:
-    """A host as others can open it."""
+def _reachable(host: str) -> str:
+    """Return a host as pages on other machines can open it."""
     if host == "0.0.0.0":
         with (
             contextlib.suppress(OSError),
             socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe,
         ):
-            # Sends nothing: it only asks which of our addresses would be used.
+            # Sends nothing: it only selects which of our addresses would be used.
             probe.connect(("192.0.2.1", 9))
             return str(probe.getsockname()[0])
     return f"[{host}]" if ":" in host else host

@@ -1,4 +1,4 @@
-"""The commands ``airhockey study new | orders | run | list | erase``."""
+"""Commands ``airhockey study new | orders | run | list | erase``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def new(file: File) -> None:
             target.write(EXAMPLE.read_text())
     except OSError as error:
         raise ValueError(f"{file}: {error.strerror}") from error
-    console.print(f"wrote {file}; airhockey study orders {file} shows who meets whom")
+    console.print(
+        f"wrote {file}; airhockey study orders {file} shows the order of opponents"
+    )
 
 
 @study.command()
@@ -38,13 +40,13 @@ def orders(
     file: File,
     participants: Annotated[int, typer.Option(help="How many.", min=1)] = 12,
 ) -> None:
-    """Print the order in which participants meet the opponents of a plan."""
+    """Print the order in which participants play the opponents of a plan."""
     require("starlette", "play")
-    from marl_airhockey.study.plan import load
-    from marl_airhockey.study.study import open_court
+    from marl_airhockey.study.opponents import open_match
+    from marl_airhockey.study.plan_file import load_plan
 
-    plan = load(file)
-    open_court(plan).close()
+    plan = load_plan(file)
+    open_match(plan).close()
     table = Table("participant")
     for k in range(plan.blocks):
         table.add_column(f"block {k + 1}", overflow="fold")
@@ -66,15 +68,17 @@ def run(
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.server import application
-    from marl_airhockey.study.archive import claim
-    from marl_airhockey.study.plan import load
+    from marl_airhockey.study.archive import claim_folder
+    from marl_airhockey.study.plan_file import load_plan
     from marl_airhockey.study.study import Study
 
-    plan = load(file)
-    claim(out, file)
+    plan = load_plan(file)
+    claim_folder(out, file)
     with console.status("preparing the table (longer when it is the first time)"):
         session = Study(plan, out)
-    host_table(lambda door: application(session, door), plan.title, host, port, browser)
+    host_table(
+        lambda access: application(session, access), plan.title, host, port, browser
+    )
     if session.failure is not None:
         raise session.failure
 
@@ -83,7 +87,7 @@ def run(
 def list_participants(
     folder: Annotated[Path, typer.Argument(help="Of the study.")],
 ) -> None:
-    """List participants: number, code, how far they came."""
+    """List participants: number, code, games, answered blocks, how they ended."""
     from marl_airhockey.study.archive import diaries
 
     table = Table("number", "code", "began", "games", "blocks answered", "state")

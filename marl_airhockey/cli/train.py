@@ -1,10 +1,10 @@
-"""Train: see the definitions."""
+"""Commands ``airhockey train | export | demo``."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,12 +20,15 @@ from marl_airhockey.cli.options import (
     app,
     bar,
     console,
-    grade,
+    measure_of,
     settings,
-    train_shown,
+    train_with_progress,
 )
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.physics import load_physics
+
+if TYPE_CHECKING:
+    from marl_airhockey.learn.config import TrainConfig
 
 
 @app.command()
@@ -55,46 +58,50 @@ def train(
     option: Options = None,
     other: Drivers = None,
     physics: Physics = None,
-    resume: Annotated[Path | None, typer.Option(help="Go on with this run.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Resume this run.")] = None,
     num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
     from marl_airhockey.learn.config import preset
 
-    if resume is None:
-        changes = settings(change) | {
-            "seed": seed,
-            "backend": backend,
-            "profile": profile,
-            "options": settings(option),
-            "drivers": settings(other),
-        }
-        if physics is not None:
-            changes["physics"] = load_physics(physics)
-        if steps is not None:
-            changes["total_steps"] = steps
-        if hidden is not None:
-            changes["hidden"] = [hidden, hidden]
-        if init is not None:
-            changes["init"] = str(init)
-        if engine is not None:
-            changes["engine"] = engine
-        if num_env_runners is not None:
-            changes["num_env_runners"] = num_env_runners
-        config = preset(scenario, changes)
-        folder = out or Path("runs") / f"{scenario}-{seed}"
-    else:
-        given = (scenario, change, option, other, steps, hidden, out, engine)
-        if any(given) or any(x is not None for x in (num_env_runners, init, physics)):
+    given = {
+        "physics": load_physics(physics) if physics is not None else None,
+        "total_steps": steps,
+        "hidden": [hidden, hidden] if hidden is not None else None,
+        "init": str(init) if init is not None else None,
+        "engine": engine,
+        "num_env_runners": num_env_runners,
+    }
+    given = {name: value for name, value in given.items() if value is not None}
+    if resume is not None:
+        if given or any((scenario, change, option, other, out)):
             raise ValueError("--resume goes on as the run was begun: give nothing else")
-        config, folder = None, resume
-    row = train_shown(config, folder)
+        _train(None, resume, scenario, as_json)
+        return
+    changes = settings(change) | {
+        "seed": seed,
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+        "drivers": settings(other),
+        **given,
+    }
+    folder = out or Path("runs") / f"{scenario}-{seed}"
+    _train(preset(scenario, changes), folder, scenario, as_json)
+
+
+def _train(
+    config: TrainConfig | None, folder: Path, scenario: str, as_json: bool
+) -> None:
+    """Train, or resume a run for None, and print the result."""
+    row = train_with_progress(config, folder)
+    measure = measure_of(row)
     if as_json:
         console.print_json(json.dumps({"run": str(folder), **row}))
         return
     console.print(
-        f"{folder}: {grade(row)} {row[grade(row)]:.3f} after {row['steps']:,.0f} steps "
+        f"{folder}: {measure} {row[measure]:.3f} after {row['steps']:,.0f} steps "
         f"and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
     )
     name = scenario or "SCENARIO"
@@ -130,7 +137,8 @@ def demo(
         task = progress.add_task(f"learning to {scenario}", total=None, note="")
 
         def report(done: int, total: int, row: dict[str, float]) -> None:
-            name = grade(row)
+            """Show the progress of training."""
+            name = measure_of(row)
             note = f"{name} {row[name]:.2f}" if row else ""
             progress.update(task, completed=done, total=total, note=note)
 

@@ -1,4 +1,4 @@
-"""The commands ``airhockey transfer | fit``."""
+"""Commands ``airhockey transfer | fit``."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from marl_airhockey.cli.options import (
     bar,
     console,
     settings,
-    train_shown,
+    train_with_progress,
 )
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
@@ -27,6 +27,7 @@ from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.transfer.measure import TransferResult
 
 
 def transfer(
@@ -57,40 +58,15 @@ def transfer(
     num_workers: Workers = None,
     as_json: AsJson = False,
 ) -> None:
-    """How do policies from the 2D table do elsewhere? Success with 95 % intervals."""
-    from marl_airhockey.transfer.measure import (
-        fine_tuning_config,
-        measure_transfer,
-        plot_transfer,
-        pretraining_config,
-    )
+    """Measure policies from the 2D table elsewhere: success with 95 % intervals."""
+    from marl_airhockey.transfer.measure import measure_transfer, plot_transfer
 
     folder = out or Path("runs") / f"transfer-{scenario}"
-    # All that may be wrong is looked at before anything takes time.
+    # Everything that may be wrong is checked before anything takes time.
     backends, profiles = _list(to), _list(profile)
-    for backend in backends:
-        find_backend(backend)
-    for kind in profiles:
-        if kind not in PROFILES:
-            raise ValueError(unknown_name("profile", kind, PROFILES))
+    _check_names(backends, profiles)
     make_scenario(scenario, **settings(option))
-    for name in policy or []:
-        make_agent(name)
-    names = list(policy or [])
-    if not names:
-        for kind in PROFILES:
-            names.append(_run(folder / kind, pretraining_config(scenario, kind, seed)))
-    if fine_tune:
-        runs = [n for n in names if (Path(n) / "config.toml").exists()]
-        if not runs:
-            raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
-        for name in runs:
-            run = folder / f"{Path(name).name}-tuned-{fine_tune}"
-            names.append(_run(run, fine_tuning_config(Path(name), fine_tune)))
-    policies: dict[str, Driver] = {}
-    for name in names:
-        short = Path(name).name if Path(name).exists() else name
-        policies[name if short in policies else short] = make_agent(name)
+    policies = _policies(scenario, policy or [], fine_tune, seed, folder)
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)
         task = progress.add_task("measuring", total=total, note="")
@@ -111,30 +87,80 @@ def transfer(
     if as_json:
         console.print_json(data)
         return
-    table = Table("policy", "in", title=f"{scenario}: success in {episodes} episodes")
-    for kind in profiles:
-        table.add_column(f"{kind} profile (95 %)", justify="right")
-    for name in policies:
-        for backend in backends:
-            mine = [r for r in rows if (r.policy, r.backend) == (name, backend)]
-            cells = [
-                f"{r.success:.3f} ({r.interval[0]:.2f}..{r.interval[1]:.2f})"
-                for r in mine
-            ]
-            table.add_row(name, backend, *cells)
-    console.print(table)
+    console.print(_table(rows, f"{scenario}: success in {episodes} episodes"))
     console.print("files:", folder / "transfer.json", folder / "transfer.png")
 
 
+def _policies(
+    scenario: str, names: list[str], fine_tune: int, seed: int, folder: Path
+) -> dict[str, Driver]:
+    """Return the policies to measure, by name, after all training that they need.
+
+    Args:
+        scenario: what they play.
+        names: of policies or runs; if empty, one is trained in each profile.
+        fine_tune: steps by which each run is trained on; 0 for none.
+        seed: of training.
+        folder: of the runs.
+    """
+    from marl_airhockey.transfer.measure import fine_tuning_config, pretraining_config
+
+    for name in names:
+        make_agent(name)
+    names = list(names)
+    if not names:
+        for kind in PROFILES:
+            names.append(_run(folder / kind, pretraining_config(scenario, kind, seed)))
+    if fine_tune:
+        runs = [n for n in names if (Path(n) / "config.toml").exists()]
+        if not runs:
+            raise ValueError(f"--fine-tune: of {names}, none is the folder of a run")
+        for name in runs:
+            run = folder / f"{Path(name).name}-tuned-{fine_tune}"
+            names.append(_run(run, fine_tuning_config(Path(name), fine_tune)))
+    policies: dict[str, Driver] = {}
+    for name in names:
+        short = Path(name).name if Path(name).exists() else name
+        policies[name if short in policies else short] = make_agent(name)
+    return policies
+
+
+def _table(rows: list[TransferResult], title: str) -> Table:
+    """Return a table with a row for each policy and backend, a column for a profile."""
+    table = Table("policy", "in", title=title)
+    for kind in dict.fromkeys(row.profile for row in rows):
+        table.add_column(f"{kind} profile (95 %)", justify="right")
+    for policy, backend in dict.fromkeys((row.policy, row.backend) for row in rows):
+        table.add_row(
+            policy,
+            backend,
+            *(
+                f"{r.success:.3f} ({r.interval[0]:.2f}..{r.interval[1]:.2f})"
+                for r in rows
+                if (r.policy, r.backend) == (policy, backend)
+            ),
+        )
+    return table
+
+
+def _check_names(backends: list[str], profiles: list[str]) -> None:
+    """Raise an error that names an unknown backend or profile."""
+    for backend in backends:
+        find_backend(backend)
+    for profile in profiles:
+        if profile not in PROFILES:
+            raise ValueError(unknown_name("profile", profile, PROFILES))
+
+
 def _list(names: str) -> list[str]:
-    """The names in a list with commas, each once."""
+    """Return the names in a list with commas, each once."""
     return list(dict.fromkeys(name.strip() for name in names.split(",")))
 
 
 def _run(folder: Path, config: TrainConfig) -> str:
-    """Train what is not trained yet, or not to its end."""
+    """Train a run, or resume it if it is there; return its folder."""
     begun = (folder / "config.toml").exists()
-    train_shown(None if begun else config, folder)
+    train_with_progress(None if begun else config, folder)
     return str(folder)
 
 
@@ -162,11 +188,11 @@ def fit(
     if recordings is not None:
         seen = load_recordings(sorted(recordings.glob("*.jsonl")))
     else:
-        who = make_agent(driver or f"zoo/{scenario}")
+        player = make_agent(driver or f"zoo/{scenario}")
         there = load_physics(physics) if physics else {}
         with console.status(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}
-            seen = record_play(scenario, who, steps, seed, keywords)
+            seen = record_play(scenario, player, steps, seed, keywords)
     with console.status("fitting"):
         found = fit_physics(seen)
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -176,8 +202,8 @@ def fit(
         usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
         table.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
     for k, name in enumerate(("pucks off, mm", "paddles off, mm")):
-        shown = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
-        table.add_row(name, *shown)
+        errors = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
+        table.add_row(name, *errors)
     console.print(table)
     console.print(
         f"{found.error_reduction:.0%} of the pucks' error is gone; wrote {out}"

@@ -1,4 +1,4 @@
-"""Watch: see the definitions."""
+"""Command ``airhockey watch``."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ def watch(
 
 
 def watch_recording(recording: Path, video: Path) -> None:
-    """Make a video of a recording."""
-    from marl_airhockey.play.video import film
+    """Write a video of a recording and print its size."""
+    from marl_airhockey.play.video import write_recording_video
 
-    film(recording, video)
+    write_recording_video(recording, video)
     console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

@@ -66,7 +66,7 @@ class Driver:
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """Return the action (B, 2), a velocity as a fraction of top speed, and the memory.
+        """Return the action (B, 2), fractions of top speed, and the memory.
 
         It is not called of a driver that prescribes.
         """

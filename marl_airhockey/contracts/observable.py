@@ -52,8 +52,8 @@ class ObservationContext:
     def extent(self) -> Array:
         """(2,) largest |x| and |y| of the table in any seat's ego frame, m."""
         corners = np.asarray(self.scene.table.vertices)
-        turned = [corners @ r.T for r in self.rotations]
-        return np.asarray(np.max(np.abs(turned), axis=(0, 1)))
+        rotated = [corners @ r.T for r in self.rotations]
+        return np.asarray(np.max(np.abs(rotated), axis=(0, 1)))
 
     @cached_property
     def rotations(self) -> Array:
@@ -101,24 +101,24 @@ class EgoView:
         """(..., S, 2) each seat's own paddle, m"""
         self.own_velocity = self._own(state.paddle_velocity)
         """(..., S, 2) m/s"""
-        self.puck = self.turn(state.puck)
+        self.puck = self.rotate(state.puck)
         """(..., S, pucks, 2) m"""
-        self.puck_velocity = self.turn(state.puck_velocity)
+        self.puck_velocity = self.rotate(state.puck_velocity)
         """(..., S, pucks, 2) m/s"""
 
-    def turn(self, vectors: Array) -> Array:
+    def rotate(self, vectors: Array) -> Array:
         """(..., n, 2) vectors of the table frame to (..., S, n, 2) in ego frames."""
         seats = vectors[..., None, :, :]
         if self.scope.straight:
             return seats
-        turned: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
-        return turned
+        rotated: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
+        return rotated
 
     def _own(self, vectors: Array) -> Array:
         if self.scope.straight:
             return vectors
         seats = np.arange(vectors.shape[-2])
-        own: Array = self.turn(vectors)[..., seats, seats, :]
+        own: Array = self.rotate(vectors)[..., seats, seats, :]
         return own
 
 

@@ -178,7 +178,7 @@ class Scenario(ABC):
         return new
 
     def all_reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return all reward terms, the regularising ones included, (..., seats) each."""
+        """Return all reward terms, the regularising ones too, (..., seats) each."""
         if self.goals == "dict":
             met = self.goal_met(t.after, t.new_memory)
             return {"goal": met[..., None].astype(np.float64)}

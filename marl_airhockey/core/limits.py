@@ -180,7 +180,7 @@ def _limit(
 
 @njit(cache=True, error_model="numpy")
 def _within(wx: float, wy: float, dx: float, dy: float, most: float) -> float:
-    """Return the largest share of (wx, wy) with |(dx, dy) + share (wx, wy)| <= most, 0..1."""
+    """Return the largest share s in 0..1 with |(dx, dy) + s (wx, wy)| <= most."""
     a = max(wx * wx + wy * wy, 1e-18)
     b = dx * wx + dy * wy
     c = dx * dx + dy * dy - most * most

@@ -91,7 +91,7 @@ class State:
     banked: Array
     """(..., pucks, sides) bounces off each side of the table that began in the step"""
     crossed: Array
-    """(..., pucks, goal_lines) bool: went through, or touched a goal line that is a wall"""
+    """(..., pucks, goal_lines) bool: passed it, or touched one that is a whole side"""
     crossed_velocity: Array
     """(..., pucks, goal_lines, 2) m/s of the puck as it crossed"""
     visible: Array
@@ -99,7 +99,7 @@ class State:
     time: Array
     """(...) s since the start of the episode"""
     path: Array | None = None
-    """(..., K + 1, movers, 4) x, y, vx, vy at every substep, if the scene asks for it"""
+    """(..., K + 1, movers, 4) x, y, vx, vy at every substep, if the scene wants it"""
 
     @property
     def paddle(self) -> Array:

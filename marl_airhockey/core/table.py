@@ -42,8 +42,8 @@ class Table:
         if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
             raise ValueError("table.vertices: at least three (x, y) corners are needed")
         ahead = np.roll(corners, -1, axis=0) - corners
-        turn = _cross(ahead, np.roll(ahead, -1, axis=0))
-        if (turn <= 0).any():
+        bend = _cross(ahead, np.roll(ahead, -1, axis=0))
+        if (bend <= 0).any():
             raise ValueError("table.vertices: must be convex and counter-clockwise")
         if (self.offsets <= 0).any():
             raise ValueError("table.vertices: the origin must lie inside the table")

@@ -12,7 +12,7 @@ TOUCH_GAP = 0.15
 
 
 def no_touches(state: State) -> Memory:
-    """Return the memory of `count_touches` at the start of an episode, (W, ...) rows."""
+    """Return the memory of `count_touches` where an episode begins, (W, ...) rows."""
     return {
         "touches": np.zeros_like(state.touched),
         "apart": np.where(state.touching, 0.0, np.inf),

@@ -54,7 +54,7 @@ def global_state(world: World) -> Array:
 
 
 def _scale(world: World) -> Array:
-    """(movers, 4) bounds of x, y, vx, vy; a puck out of play lies beyond a goal line."""
+    """(movers, 4) bounds of x, y, vx, vy; a puck out of play lies behind a goal."""
     bodies, corners = world.scene.bodies, np.asarray(world.scene.table.vertices)
     bound = np.zeros((bodies.movers, 4))
     bound[:, :2] = np.abs(corners).max(0) + 0.25

@@ -6,14 +6,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-FORMAT = 1
-"""Number of the format, in the meta line"""
-STEP = {"n", "time", "pads", "pucks", "events", "excess", "delays", "caption"}
-"""Keys that every step must have"""
+FORMAT = 2
+"""Version of the format; 1 had other names of keys, and is refused."""
+
+
+STEP = {"n", "time", "paddles", "pucks", "events", "violation", "delays", "caption"}
+"""Keys that readers need of every step."""
 
 
 def head(path: Path) -> dict[str, Any]:
-    """Return the first line of a file of JSON lines; {} if it is no such file."""
+    """Return the first line of a file of JSON lines; {} if the file is none."""
     try:
         with path.open() as file:
             row = json.loads(file.readline())
@@ -23,13 +25,14 @@ def head(path: Path) -> dict[str, Any]:
 
 
 def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
-    """Return the meta line, the steps and the end of a recording.
+    """Return the meta line, the steps and the end line of a recording.
 
-    The end is {} if the recording was cut off. An incomplete line, and all lines after
-    it, are left out.
+    The end is {} if the file was cut off. The first line that is not whole JSON, and
+    all after it, is left out.
 
     Raises:
-        ValueError: no recording, or one of another format.
+        ValueError: no recording, one of another version, or an incomplete step; names
+            the file.
     """
     try:
         lines = path.read_text().splitlines()
@@ -43,8 +46,13 @@ def read(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, An
             break
     if not rows or not isinstance(rows[0], dict) or rows[0].get("kind") != "meta":
         raise ValueError(f"{path}: no recording of airhockey play")
-    if rows[0].get("format") != FORMAT:
-        raise ValueError(f"{path}: format {rows[0].get('format')}, expected {FORMAT}")
+    found = rows[0].get("format")
+    if found != FORMAT:
+        age = "older" if isinstance(found, int) and found < FORMAT else "other"
+        raise ValueError(
+            f"{path}: recorded by an {age} version of marl_airhockey (format {found}); "
+            f"this version reads format {FORMAT} alone"
+        )
     for number, row in enumerate(rows[1:], 2):
         if row.get("kind") == "step" and not row.keys() >= STEP:
             raise ValueError(f"{path}: line {number} lacks {sorted(STEP - row.keys())}")

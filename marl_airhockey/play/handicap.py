@@ -1,4 +1,4 @@
-"""A fair opponent: a driver made as slow, as late and as unsteady as a person."""
+"""Handicaps: programs made as late, as unsteady and as slow as people."""
 
 from __future__ import annotations
 
@@ -13,54 +13,87 @@ from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.seat import Seat
 from marl_airhockey.types import Array
 
+BOUNDS = {"reaction": (0.0, 0.3), "noise": (0.0, 1.0), "pace": (0.05, 1.0)}
+"""Smallest and largest value of each field of `Handicap`."""
 
-@dataclass
-class Handicap(Driver):
-    """Passes on what another driver asks: later, with noise, at a lower pace.
+
+@dataclass(frozen=True)
+class Handicap:
+    """Limits on what a program can do; the defaults are no limits.
 
     Raises:
-        ValueError: a value out of its range, named.
+        ValueError: a value outside `BOUNDS`; names the field.
+    """
+
+    reaction: float = 0.0
+    """Delay of each action, s; rounded to a multiple of the driver's control_dt."""
+    noise: float = 0.0
+    """Standard deviation of normal noise on each component of the action, as a
+    fraction of top speed."""
+    pace: float = 1.0
+    """Largest norm of the action, as a fraction of top speed."""
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in BOUNDS.items():
+            value, unit = getattr(self, name), " s" if name == "reaction" else ""
+            if not low <= value <= high:
+                raise ValueError(
+                    f"{name}: {value:g}{unit} must be in {low:g} .. {high:g}{unit}"
+                )
+
+    def apply(self, driver: Driver) -> Driver:
+        """Return a driver that acts as `driver` does, within these limits."""
+        return HandicappedDriver(driver, self)
+
+    @property
+    def caption(self) -> str:
+        """Text of the fields that differ from the defaults; "" for none."""
+        usual = vars(Handicap())
+        changed = {k: v for k, v in vars(self).items() if v != usual[k]}
+        return ", ".join(f"{k} {v:g}" for k, v in changed.items())
+
+
+PRESETS = {
+    "full strength": Handicap(),
+    "human speed": Handicap(reaction=0.15, noise=0.05, pace=0.7),
+    "gentle": Handicap(reaction=0.25, noise=0.1, pace=0.4),
+}
+"""Handicaps that a page offers, the one without limits first."""
+
+
+@dataclass
+class HandicappedDriver(Driver):
+    """Driver that passes on another one's actions within a handicap.
+
+    It decides as often as the other one; every 0.05 s if that one has no control_dt of
+    its own, as policies were trained to.
     """
 
     inner: Driver
-    reaction: float = 0.0
-    """s by which it acts late, 0 to 0.3; rounded to its own decisions."""
-    noise: float = 0.0
-    """Deviation of normal noise on what it asks, as a fraction of top speed."""
-    pace: float = 1.0
-    """Largest fraction of top speed that it asks for."""
+    handicap: Handicap
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("reaction", 0.0, 0.3),
-            ("noise", 0.0, 1.0),
-            ("pace", 0.05, 1.0),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"{name}: {value} must be in {low} .. {high}")
         self.observe = self.inner.observe
-        # Policies were trained to decide every 50 ms, whatever the loop's rate is.
         self.control_dt = self.inner.control_dt or 0.05
-        self._late = round(self.reaction / self.control_dt)
+        self._delay = round(self.handicap.reaction / self.control_dt)
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         memory = self.inner.reset(seat, rng, worlds)
-        return {**memory, "waiting": np.zeros((worlds, self._late, 2))}
+        return {**memory, "delayed_actions": np.zeros((worlds, self._delay, 2))}
 
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        waiting = memory["waiting"]
-        rest = {name: rows for name, rows in memory.items() if name != "waiting"}
-        action, rest = self.inner.act(view, rest)
-        queue = np.concatenate([waiting, action[:, None]], axis=1)
-        late = queue[:, 0]
-        if self.noise:
-            late = late + self.noise * view.rng.normal(2)
-        size = np.maximum(np.hypot(late[:, 0], late[:, 1]), 1e-9)
-        late = late * np.minimum(self.pace / size, 1.0)[:, None]
-        return late, {**rest, "waiting": queue[:, 1:]}
+        waiting = memory["delayed_actions"]
+        rest = {k: rows for k, rows in memory.items() if k != "delayed_actions"}
+        newest, rest = self.inner.act(view, rest)
+        queue = np.concatenate([waiting, newest[:, None]], axis=1)
+        action = queue[:, 0]
+        if self.handicap.noise:
+            action = action + self.handicap.noise * view.rng.normal(2)
+        norm = np.maximum(np.hypot(action[:, 0], action[:, 1]), 1e-9)
+        action = action * np.minimum(self.handicap.pace / norm, 1.0)[:, None]
+        return action, {**rest, "delayed_actions": queue[:, 1:]}
 
     def __enter__(self) -> Self:
         self.inner.__enter__()
@@ -73,31 +106,3 @@ class Handicap(Driver):
         trace: TracebackType | None,
     ) -> None:
         self.inner.__exit__(kind, error, trace)
-
-
-@dataclass(frozen=True)
-class Fairness:
-    """How programs are held back; see `handicap.Handicap`."""
-
-    reaction: float = 0.0
-    noise: float = 0.0
-    pace: float = 1.0
-
-    def hold(self, driver: Driver) -> Driver:
-        """The driver, held back."""
-        return Handicap(driver, self.reaction, self.noise, self.pace)
-
-    @property
-    def words(self) -> str:
-        """What is held back, in words; nothing for none of it."""
-        usual = vars(Fairness())
-        held = {k: v for k, v in vars(self).items() if v != usual[k]}
-        return ", ".join(f"{k} {v:g}" for k, v in held.items())
-
-
-STRENGTHS = {
-    "full strength": Fairness(),
-    "human speed": Fairness(reaction=0.15, noise=0.05, pace=0.7),
-    "gentle": Fairness(reaction=0.25, noise=0.1, pace=0.4),
-}
-"""How programs are held back at a page's choice, the full-strength one first."""

@@ -1,4 +1,4 @@
-"""Measures: see the definitions."""
+"""Measurements of a player, from the steps of recordings."""
 
 from __future__ import annotations
 
@@ -11,103 +11,123 @@ import numpy as np
 from marl_airhockey.core.limits import VIOLATIONS
 from marl_airhockey.types import Array
 
-MOVES = 0.1
-"""m/s: a faster paddle moves."""
-
-
-COMES = 0.1
-"""m/s: a puck that nears one's own end faster comes."""
-
-
-LONGEST = 1.5
-"""s after a serve within which a movement counts as the reaction to it."""
+MOVING = 0.1
+"""Speed from which a paddle counts as moving, m/s."""
+INCOMING = 0.1
+"""Speed toward one's own end from which a puck counts as incoming, m/s."""
+LONGEST_REACTION = 1.5
+"""Time after a serve within which a movement counts as a reaction to it, s."""
 
 
 @dataclass
 class Player:
-    """All that was seen of somebody, over all episodes."""
+    """All measurements of one player, over all episodes."""
 
     name: str
     person: bool
     won: int = 0
     drawn: int = 0
     lost: int = 0
-    comes: list[bool] = field(default_factory=list)
-    """Of every puck that came: whether it was met."""
+    interceptions: list[bool] = field(default_factory=list)
+    """One value for each incoming puck: True if it was hit."""
     reactions: list[float] = field(default_factory=list)
-    """s from a serve to the first movement"""
-    shots: list[float] = field(default_factory=list)
-    """m/s of pucks that left the paddle toward the other end"""
-    places: list[float] = field(default_factory=list)
-    """m aside of the middle at which they would reach the other end, banks included"""
+    """Times from a serve to the first movement, s."""
+    shot_speeds: list[float] = field(default_factory=list)
+    """Speeds of pucks that left the paddle toward the other end, m/s."""
+    shot_placements: list[float] = field(default_factory=list)
+    """Offsets from the middle at which those pucks would reach the other end, banks
+    included, m."""
     steps: int = 0
     limited: int = 0
-    """Steps in which what was asked exceeded speed, acceleration or reach"""
+    """Steps whose action exceeded the limits of speed, acceleration or reach."""
     delays: list[float] = field(default_factory=list)
-    """ms, round trips of the page"""
+    """Round trips of the page, ms."""
 
     @property
     def games(self) -> int:
-        """That were played to the end."""
+        """Number of games that were played to the end."""
         return self.won + self.drawn + self.lost
 
 
-def _watch(
+def measure(
     player: Player,
     i: int,
     seat: dict[str, Any],
     meta: dict[str, Any],
     steps: list[dict[str, Any]],
 ) -> None:
-    """Measure a player at a seat in an episode."""
+    """Add the measurements of an episode to a player.
+
+    Args:
+        player: is changed.
+        i: index of the player's seat.
+        seat: its description in the meta line.
+        meta: the meta line of the recording.
+        steps: its steps.
+    """
     bound = [VIOLATIONS.index(name) for name in ("speed", "acceleration", "reach")]
     for row in steps:
         player.steps += 1
-        player.limited += any(row["excess"][i][k] > 0 for k in bound)
+        player.limited += any(row["violation"][i][k] > 0 for k in bound)
         if row["delays"][i] is not None:
             player.delays.append(row["delays"][i])
     if not steps or not steps[0]["pucks"]:
         return
-    turn = np.array(seat["turn"])
+    match, rotation = meta["match"], np.array(seat["rotation"])
     pucks = np.array([row["pucks"] for row in steps])
-    place, motion = pucks[..., :2] @ turn.T, pucks[..., 2:] @ turn.T
-    speed = np.hypot(*np.array([row["pad_velocities"][i] for row in steps]).T)
-    corners = np.array(meta["court"]["table"]) @ turn.T
-    far, half = corners[:, 0].max(), corners[:, 1].max() - meta["court"]["puck"]
+    position, velocity = pucks[..., :2] @ rotation.T, pucks[..., 2:] @ rotation.T
+    speed = np.hypot(*np.array([row["paddle_velocities"][i] for row in steps]).T)
+    corners = np.array(match["table"]) @ rotation.T
+    end, half = corners[:, 0].max(), corners[:, 1].max() - match["puck_radius"]
     for k in range(pucks.shape[1]):
         hits = np.array([["hit", i, k] in row["events"] for row in steps])
-        player.comes += _comes(place[:, k], motion[:, k], hits)
-        for n in np.flatnonzero(hits & (motion[:, k, 0] > COMES)):
-            x, y = place[n, k]
-            vx, vy = motion[n, k]
-            player.shots.append(float(np.hypot(vx, vy)))
-            aside = y + vy * (far - x) / vx
-            folded = half - abs((aside + half) % (4 * half) - 2 * half)
-            player.places.append(float(folded))
+        player.interceptions += interceptions(position[:, k], velocity[:, k], hits)
+        for n in np.flatnonzero(hits & (velocity[:, k, 0] > INCOMING)):
+            x, y = position[n, k]
+            vx, vy = velocity[n, k]
+            player.shot_speeds.append(float(np.hypot(vx, vy)))
+            offset = y + vy * (end - x) / vx
+            folded = half - abs((offset + half) % (4 * half) - 2 * half)
+            player.shot_placements.append(float(folded))
         dt = meta["control_dt"]
-        player.reactions += _reactions(place[:, k], motion[:, k], speed, dt)
+        player.reactions += reactions(position[:, k], velocity[:, k], speed, dt)
 
 
-def _comes(place: Array, motion: Array, hits: Array) -> Iterator[bool]:
-    """Of every time that a puck came into one's own half: whether it was met."""
-    coming = False
-    for n in range(len(place)):
-        near = place[n, 0] < 0.0 and motion[n, 0] < -COMES
-        if not coming and near and not hits[n]:
-            coming = True
-        elif coming and hits[n]:
-            coming = False
+def interceptions(position: Array, velocity: Array, hits: Array) -> Iterator[bool]:
+    """Yield, each time that a puck came into one's own half, whether it was hit.
+
+    Args:
+        position: of the puck, (T, 2) m, ego frame.
+        velocity: of the puck, (T, 2) m/s, ego frame.
+        hits: (T,) steps in which one's paddle hit it.
+    """
+    incoming = False
+    for n in range(len(position)):
+        near = position[n, 0] < 0.0 and velocity[n, 0] < -INCOMING
+        if not incoming and near and not hits[n]:
+            incoming = True
+        elif incoming and hits[n]:
+            incoming = False
             yield True
-        elif coming and motion[n, 0] > COMES:
-            coming = False  # it came back from the wall by itself, or was served anew
+        elif incoming and velocity[n, 0] > INCOMING:
+            incoming = False  # It came back from the wall, or was served anew.
             yield False
 
 
-def _reactions(place: Array, motion: Array, speed: Array, dt: float) -> Iterator[float]:
-    """From each serve toward a player who stands still to the first movement, s."""
-    jump = np.hypot(*np.diff(place, axis=0, prepend=place[:1] + 1.0).T) > 0.1
-    served = jump & (np.hypot(*place.T) < 0.15) & (motion[:, 0] < -COMES)
-    for n in np.flatnonzero(served):
-        after = speed[n : n + round(LONGEST / dt)]
-        if after[0] < MOVES and (after >= MOVES).any():
-            yield float(np.argmax(after >= MOVES) * dt)
+def reactions(
+    position: Array, velocity: Array, speed: Array, dt: float
+) -> Iterator[float]:
+    """Yield the times, s, from serves toward a resting player to the first movement.
+
+    Args:
+        position: of the puck, (T, 2) m, ego frame.
+        velocity: of the puck, (T, 2) m/s, ego frame.
+        speed: of the player's paddle, (T,) m/s.
+        dt: duration of a step, s.
+    """
+    jumped = np.hypot(*np.diff(position, axis=0, prepend=position[:1] + 1.0).T) > 0.1
+    central = np.hypot(*position.T) < 0.15
+    for n in np.flatnonzero(jumped & central & (velocity[:, 0] < -INCOMING)):
+        after = speed[n : n + round(LONGEST_REACTION / dt)]
+        if after[0] < MOVING and (after >= MOVING).any():
+            yield float(np.argmax(after >= MOVING) * dt)

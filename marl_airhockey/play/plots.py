@@ -1,4 +1,4 @@
-"""The picture of a report."""
+"""Plot of a report."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from marl_airhockey.play.measures import Player
 from marl_airhockey.play.report import Report
 
 MOST = 4
-"""Players whose distributions are drawn."""
+"""Largest number of players whose distributions are drawn."""
 
 
-def picture(report: Report, path: Path) -> None:
-    """Scores, reactions, speed and placement of shots, as a PNG."""
+def plot_report(report: Report, path: Path) -> None:
+    """Write a PNG of scores, reactions, speed and placement of shots."""
     ranked = sorted(report.players.values(), key=lambda p: (not p.person, -p.games))
     shown = list(zip(ranked, (INK, *INKS), strict=False))[:MOST]
     figure, grid = plt.subplots(2, 2, figsize=(9, 6), dpi=DPI, layout="constrained")
     _scores(grid[0, 0], report)
     panels = (
         (grid[0, 1], "reactions", "ms from a serve to the first movement", 1000.0),
-        (grid[1, 0], "shots", "speed of shots, m/s", 1.0),
-        (grid[1, 1], "places", "where shots would arrive, m aside", 1.0),
+        (grid[1, 0], "shot_speeds", "speed of shots, m/s", 1.0),
+        (grid[1, 1], "shot_placements", "offset at which shots would arrive, m", 1.0),
     )
     for axes, name, label, scale in panels:
         _distributions(axes, name, label, scale, shown)
@@ -33,6 +33,7 @@ def picture(report: Report, path: Path) -> None:
 
 
 def _scores(axes: Axes, report: Report) -> None:
+    """Draw each player's score with its interval."""
     rows = [row for row in report.rows() if row["games"]][::-1]
     for k, row in enumerate(rows):
         middle, low, high = row["score"]
@@ -52,6 +53,7 @@ def _distributions(
     scale: float,
     players: list[tuple[Player, str]],
 ) -> None:
+    """Draw the cumulative distributions of a field of `Player`."""
     drawn = False
     for player, ink in players:
         values = scale * np.sort(getattr(player, name))

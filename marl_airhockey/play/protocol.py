@@ -1,4 +1,4 @@
-"""What pages may say to the server: a line of JSON, checked field by field."""
+"""Messages from a page to the server: JSON objects, checked field by field."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 from typing import Any
 
 LARGEST = 1024
-"""Characters of a message."""
-FASTEST = 240.0
+"""Most characters of a message."""
+RATE_LIMIT = 240.0
 """Messages per second that a page may send on average."""
 BURST = 480.0
-"""Messages that it may send at once."""
+"""Messages that a page may send at once."""
 MESSAGES: dict[str, dict[str, type]] = {
     "hello": {"key": str},
     "aim": {"x": float, "y": float, "q": int, "rtt": float},
@@ -23,23 +23,26 @@ MESSAGES: dict[str, dict[str, type]] = {
     "sit": {"seat": int},
     "leave": {},
     "opponent": {"seat": int, "name": str},
-    "strength": {"name": str},
+    "handicap": {"name": str},
     "consent": {"version": str},
     "answer": {"question": str, "value": int},
     "withdraw": {},
     "next": {},
 }
-"""Kinds of messages and their fields. Places are metres in the table frame, sticks
-shares of full tilt in the table frame, ``q`` counts a page's aims, ``rtt`` is the time
-in ms that it measured between an aim and the frame that shows it. The last four are of
-studies alone."""
+"""Kinds of messages (key ``t``) and the types of their fields.
+
+``x`` and ``y`` are a position in the table frame, m, for ``aim``, and a share of full
+tilt along the axes of the table frame for ``stick``. ``q`` counts the aims of a page;
+``rtt`` is the time, ms, that it measured between an aim and the frame that shows it.
+The last four kinds belong to studies.
+"""
 
 
 def parse(text: str) -> tuple[str, dict[str, Any]]:
-    """The kind of a message and its fields.
+    """Return the kind of a message and its fields.
 
     Raises:
-        ValueError: anything but one of `MESSAGES`; says what is wrong.
+        ValueError: text that is none of `MESSAGES`; says what is wrong.
     """
     if len(text) > LARGEST:
         raise ValueError(f"a message has at most {LARGEST} characters")
@@ -59,10 +62,12 @@ def parse(text: str) -> tuple[str, dict[str, Any]]:
 
 
 def _refuse(name: str) -> None:
+    """Raise ValueError for NaN and Infinity, which JSON does not have."""
     raise ValueError(f"{name} is no number")
 
 
 def _check(name: str, value: Any, kind: type) -> Any:
+    """Return a field's value as its type; raise ValueError if it has another."""
     if kind is str:
         if not isinstance(value, str) or not 0 < len(value) <= 80:
             raise ValueError(f"{name}: must be 1 to 80 characters")
@@ -75,19 +80,24 @@ def _check(name: str, value: Any, kind: type) -> Any:
     return kind(value)
 
 
-class Meter:
-    """How often somebody may speak: a bucket that fills at `FASTEST`."""
+class RateLimiter:
+    """Token bucket that refills at `RATE_LIMIT` up to `BURST`.
+
+    Args:
+        now: time, s.
+    """
 
     def __init__(self, now: float) -> None:
         self._level, self._last = BURST, now
 
-    def take(self, now: float) -> None:
-        """Count a message.
+    def acquire(self, now: float) -> None:
+        """Count a message at a time, s.
 
         Raises:
-            ValueError: too many.
+            ValueError: too many messages.
         """
-        self._level = min(BURST, self._level + (now - self._last) * FASTEST) - 1.0
+        refilled = self._level + (now - self._last) * RATE_LIMIT
+        self._level = min(BURST, refilled) - 1.0
         self._last = now
         if self._level < 0.0:
-            raise ValueError(f"more than {FASTEST:.0f} messages a second")
+            raise ValueError(f"more than {RATE_LIMIT:.0f} messages a second")

@@ -1,8 +1,8 @@
-"""Games on disk, line by line: what is written survives a kill of the process.
+"""Recorder of matches: what it has written survives a kill of the process.
 
 An episode is a file of JSON lines: ``meta`` (with the state before the first step as
-``start``), a ``step`` for every control step, and an ``end``. A file without an end was
-cut off.
+``first_state``), a ``step`` for every control step, and an ``end``. A file without an
+end was cut off.
 """
 
 from __future__ import annotations
@@ -16,17 +16,23 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, TextIO
 
-import numpy as np
-
 from marl_airhockey.evaluation.recordings import FORMAT
-from marl_airhockey.play.live_match import Court
+from marl_airhockey.play.live_match import LiveMatch
+from marl_airhockey.play.messages import rounded
 
 SYNC = 1.0
-"""s between two times that the file is forced onto the disk."""
+"""Time between two calls of fsync, s."""
 
 
 class Recorder:
-    """Writes the episodes of a court into a folder."""
+    """Writer of the episodes of a match, a file each.
+
+    Args:
+        folder: is made if it does not exist.
+
+    Raises:
+        ValueError: a folder that cannot be made.
+    """
 
     def __init__(self, folder: Path) -> None:
         try:
@@ -35,61 +41,71 @@ class Recorder:
             raise ValueError(f"--record {folder}: {error.strerror}") from error
         self._folder = folder
         self.notes: dict[str, Any] = {}
-        """What else the first line of a file says, under "study"."""
+        """Value of the key "study" of the meta line."""
         self._file: TextIO | None = None
         self.path: Path | None = None
-        """Of the last file."""
+        """Path of the last file."""
         self._synced = 0.0
 
-    def begin(self, court: Court, players: list[dict[str, Any]]) -> Path:
-        """Begin a file; ``players`` says of each seat who sits there."""
-        self.end(court, "cut off")
+    def begin(self, match: LiveMatch, players: list[dict[str, Any]]) -> Path:
+        """Begin a file and return its path.
+
+        Args:
+            match: whose first step of an episode has been made.
+            players: by seat: driver, person's pseudonym, consent.
+        """
+        self.end(match, "cut off")
         now = datetime.datetime.now(datetime.UTC)
-        scenario = court.world.scenario.name
+        scenario = match.world.scenario.name
         stamp = now.strftime("%Y%m%d-%H%M%S-%f")
         path = self.path = self._folder / f"{stamp}-{scenario}.jsonl"
         self._file = path.open("x")
-        physics = court.world.episode.physics
+        physics = match.world.episode.physics
         self._write(
             {
                 "kind": "meta",
                 "format": FORMAT,
                 "began": now.isoformat(),
-                "options": court.keywords.get("options", {}),
-                "backend": court.keywords.get("backend", "pymunk"),
-                "profile": court.keywords.get("profile", "ideal"),
-                "control_dt": court.world.control_dt,
+                "options": match.keywords.get("options", {}),
+                "backend": match.keywords.get("backend", "pymunk"),
+                "profile": match.keywords.get("profile", "ideal"),
+                "control_dt": match.world.control_dt,
                 "physics": {k: float(v[0]) for k, v in physics.items()},
-                "seed": int(court.world.seeds[0]),
-                "episode": int(court.world.episode.number[0]),
+                "seed": int(match.world.seeds[0]),
+                "episode": int(match.world.episode.number[0]),
                 "players": players,
-                "fairness": vars(court.fairness),
+                "handicap": vars(match.drivers.handicap),
                 "versions": {
                     "marl_airhockey": metadata.version("marl_airhockey"),
                     "python": platform.python_version(),
                 },
                 "study": self.notes,
-                "court": court.describe(),
-                "start": court.opening,
+                "match": match.describe(),
+                "first_state": match.first_state,
             }
         )
         return path
 
-    def step(self, court: Court, delays: list[float | None]) -> None:
-        """Add the step that was just made; ``delays`` are round trips of seats, ms."""
-        if self._file is None or court.result is None:
+    def step(self, match: LiveMatch, delays: list[float | None]) -> None:
+        """Add the last step.
+
+        Args:
+            match: that made it.
+            delays: round trip of the page at each seat, ms; None for programs.
+        """
+        if self._file is None or match.result is None:
             return
-        world, terms = court.world, court.result.terms
+        world, terms = match.world, match.result.terms
         self._write(
             {
                 "kind": "step",
                 "clock": round(time.time(), 4),
-                **court.state(),
-                "pad_velocities": np.round(world.state.paddle_velocity[0], 4).tolist(),
-                "asked": np.round(world.action[0], 4).tolist(),
-                "sent": np.round(world.command[0], 4).tolist(),
-                "terms": {k: np.round(v[0], 4).tolist() for k, v in terms.items()},
-                "excess": np.round(court.result.violation[0], 4).tolist(),
+                **match.state(),
+                "paddle_velocities": rounded(world.state.paddle_velocity[0]),
+                "action": rounded(world.action[0]),
+                "command": rounded(world.command[0]),
+                "terms": {k: rounded(v[0]) for k, v in terms.items()},
+                "violation": rounded(match.result.violation[0]),
                 "delays": delays,
             }
         )
@@ -98,17 +114,17 @@ class Recorder:
             os.fsync(self._file.fileno())
             self._synced = now
 
-    def end(self, court: Court, reason: str) -> None:
-        """Close the file with how the episode ended."""
+    def end(self, match: LiveMatch, reason: str) -> None:
+        """Write the end line and close the file, if one is open."""
         if self._file is None:
             return
-        world = court.world
+        world = match.world
         self._write(
             {
                 "kind": "end",
                 "reason": reason,
-                "steps": court.ticks,
-                "returns": np.round(world.episode.returns[0], 4).tolist(),
+                "steps": match.ticks,
+                "returns": rounded(world.episode.returns[0]),
                 "success": world.episode.success[0].tolist(),
             }
         )
@@ -119,5 +135,5 @@ class Recorder:
     def _write(self, row: dict[str, Any]) -> None:
         assert self._file is not None
         self._file.write(json.dumps(row, separators=(",", ":")) + "\n")
-        # To the system: a killed process loses nothing of it.
+        # Handed to the operating system: a killed process loses nothing of it.
         self._file.flush()

@@ -1,4 +1,4 @@
-"""What recordings say about players: results, reactions, shots, limits."""
+"""Report of recordings, by player: results, reactions, shots, limits."""
 
 from __future__ import annotations
 
@@ -12,37 +12,36 @@ import numpy as np
 
 from marl_airhockey.evaluation.recordings import head, read
 from marl_airhockey.evaluation.stats import bootstrap, elo, interval, iqm
-from marl_airhockey.play.handicap import Fairness
-from marl_airhockey.play.measures import MOVES, Player, _watch
+from marl_airhockey.play.handicap import Handicap
+from marl_airhockey.play.measures import MOVING, Player, measure
 from marl_airhockey.types import Array
 
 COMPLETE = "played to the end"
-"""How a recording ends whose game was not broken off."""
-
-
+"""Reason in the end line of a game that was not broken off."""
 RESAMPLES = 400
-
-
-ASIDE = ("diary.jsonl", "erased.jsonl")
-"""What a study keeps beside its recordings."""
-
-
+"""Bootstrap resamples of an interval."""
+OTHER_FILES = ("diary.jsonl", "erased.jsonl")
+"""Files of a study that are no recordings."""
 FEWEST = 5
-"""Games without which an Elo has no interval: their results are too often all alike."""
+"""Games from which an Elo has an interval: fewer have too often all the same result."""
 
 
 @dataclass
 class Report:
-    """Players by name, and the games between them."""
+    """Measurements of all players, and the games between them."""
 
     players: dict[str, Player]
+    """Measurements by the player's name."""
     games: list[tuple[str, str, float]]
-    """Two players and the first one's score"""
+    """Rows (player, other player, score of the first: 1, 0.5 or 0)."""
     episodes: int
     broken_off: int
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row a player, those with most games first; nan where nothing was seen."""
+        """Return a row for each player, those with most games first.
+
+        Values with an interval are lists (value, low, high); nan where there is none.
+        """
         ratings = self._ratings()
         ranked = sorted(self.players.values(), key=lambda p: (-p.games, p.name))
         return [
@@ -52,18 +51,18 @@ class Report:
                 "games": p.games,
                 "score": _share(p.won + 0.5 * p.drawn, p.games),
                 "elo": ratings.get(p.name, [float("nan")] * 3),
-                "hit_rate": _share(sum(p.comes), len(p.comes)),
+                "hit_rate": _share(sum(p.interceptions), len(p.interceptions)),
                 "reaction_ms": [1000 * x for x in _middle(p.reactions)],
-                "shot_speed": _middle(p.shots),
-                "shot_spread": float(np.std(p.places)) if p.places else float("nan"),
-                "limited": p.limited / p.steps if p.steps else float("nan"),
+                "shot_speed": _middle(p.shot_speeds),
+                "shot_spread": _spread(p.shot_placements),
+                "limited": _share(p.limited, p.steps)[0],
                 "round_trip_ms": _middle(p.delays)[0],
             }
             for p in ranked
         ]
 
     def _ratings(self) -> dict[str, list[float]]:
-        """Elo of each player with its 95 % interval, games resampled."""
+        """Return the Elo of each player with its 95 % interval, games resampled."""
         names = sorted({name for a, b, _ in self.games for name in (a, b)})
         if len(names) < 2:
             return {}
@@ -71,6 +70,7 @@ class Report:
         count = len(self.games)
 
         def rate(chosen: Array) -> Array:
+            """Return the Elo of each name from some games."""
             score, played = np.zeros((2, len(names), len(names)))
             for k in chosen:
                 a, b, share = self.games[k]
@@ -82,8 +82,8 @@ class Report:
             return elo(score, played)
 
         middle = rate(np.arange(count))
-        drawn = [rate(rng.integers(0, count, count)) for _ in range(RESAMPLES)]
-        low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
+        resampled = [rate(rng.integers(0, count, count)) for _ in range(RESAMPLES)]
+        low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
         enough = [sum(name in game[:2] for game in self.games) for name in names]
         low[np.array(enough) < FEWEST] = high[np.array(enough) < FEWEST] = np.nan
         return {
@@ -92,11 +92,11 @@ class Report:
         }
 
     def to_markdown(self) -> str:
-        """A table."""
+        """Return a table with a legend."""
         lines = [
             f"# {self.episodes} recorded episodes, {self.broken_off} broken off",
             "",
-            "| player | games | score (95 %) | Elo (95 %) | pucks met (95 %) "
+            "| player | games | score (95 %) | Elo (95 %) | pucks hit (95 %) "
             "| reaction, ms (95 %) | shot, m/s (95 %) | spread of shots, m "
             "| at limits | round trip, ms |",
             "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
@@ -112,47 +112,45 @@ class Report:
         lines += [
             "",
             "Score: win + draw / 2, of games played to the end. Reaction: from a serve "
-            f"to the first movement above {MOVES} m/s. Shots: pucks that left the "
+            f"to the first movement above {MOVING} m/s. Shots: pucks that left the "
             "paddle toward the other end; their interquartile mean speed, and the "
             "deviation of where they would reach that end. An Elo of fewer than "
             f"{FEWEST} games has no interval. At limits: share of the "
-            "steps in which what was asked exceeded speed, acceleration or reach.",
+            "steps whose action exceeded speed, acceleration or reach.",
         ]
         return "\n".join(lines) + "\n"
 
     def save(self, folder: Path) -> list[Path]:
-        """Write ``report.json``, ``report.md`` and ``report.png``."""
-        from marl_airhockey.play.plots import picture
-
+        """Write ``report.json`` and ``report.md``; return their paths."""
         folder.mkdir(parents=True, exist_ok=True)
-        files = [folder / f"report.{kind}" for kind in ("json", "md", "png")]
+        files = [folder / f"report.{kind}" for kind in ("json", "md")]
         data = {"episodes": self.episodes, "broken_off": self.broken_off}
         rows = [{k: _plain(v) for k, v in row.items()} for row in self.rows()]
         files[0].write_text(json.dumps({**data, "players": rows}, indent=1))
         files[1].write_text(self.to_markdown())
-        picture(self, files[2])
         return files
 
 
-def report(folder: Path, scenario: str | None = None) -> Report:
+def summarize(folder: Path, scenario: str | None = None) -> Report:
     """Read all recordings under a folder, or those of one scenario.
 
     Practice games of a study are left out.
 
     Raises:
-        ValueError: there is none, a file that is no recording, or several scenarios.
+        ValueError: no recording, several scenarios, or a file that cannot be read.
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: there is no such folder")
-    read_ones = [
+    recordings = [
         read(path)
         for path in sorted(folder.rglob("*.jsonl"))
-        if path.name not in ASIDE and not head(path).get("study", {}).get("practice")
+        if path.name not in OTHER_FILES
+        and not head(path).get("study", {}).get("practice")
     ]
-    games = sorted({meta["court"]["scenario"] for meta, _, _ in read_ones})
+    games = sorted({meta["match"]["scenario"] for meta, _, _ in recordings})
     if scenario is None and len(games) > 1:
         raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
-    wanted = [r for r in read_ones if scenario in (None, r[0]["court"]["scenario"])]
+    wanted = [r for r in recordings if scenario in (None, r[0]["match"]["scenario"])]
     if not wanted:
         what = f" of {scenario}" if scenario else ""
         raise ValueError(f"{folder}: there are no recordings{what} (*.jsonl) in it")
@@ -168,10 +166,10 @@ def _add(
     steps: list[dict[str, Any]],
     end: dict[str, Any],
 ) -> None:
-    """Take an episode into a report."""
-    seats, players = meta["court"]["seats"], []
+    """Add an episode to a report."""
+    seats, players = meta["match"]["seats"], []
     for row in meta["players"]:
-        name = row["person"] or _program(row["driver"], meta["fairness"])
+        name = row["person"] or _program(row["driver"], meta["handicap"])
         known = found.players.setdefault(name, Player(name, row["person"] is not None))
         players.append(known)
     complete = end.get("reason") == COMPLETE
@@ -180,18 +178,19 @@ def _add(
     if complete and len(set(teams)) > 1:
         _result(found, players, teams, end["success"])
     for i, player in enumerate(players):
-        _watch(player, i, seats[i], meta, steps)
+        measure(player, i, seats[i], meta, steps)
 
 
-def _program(name: str, fairness: dict[str, float]) -> str:
-    """A program's name, with how it was held back."""
-    held = Fairness(**fairness).words
-    return f"{name} ({held})" if held else name
+def _program(name: str, handicap: dict[str, float]) -> str:
+    """Return a program's name, with its handicap if it has one."""
+    caption = Handicap(**handicap).caption
+    return f"{name} ({caption})" if caption else name
 
 
 def _result(
     found: Report, players: Sequence[Player], teams: Sequence[int], won: Sequence[bool]
 ) -> None:
+    """Count a game that was played to the end, for each player and each pair."""
     anybody = any(won)
     for i, player in enumerate(players):
         player.won += won[i]
@@ -204,25 +203,30 @@ def _result(
 
 
 def _plain(value: Any) -> Any:
-    """For JSON, which has no nan."""
+    """Return a value with None for nan, which JSON does not have."""
     if isinstance(value, list):
         return [_plain(x) for x in value]
     return None if isinstance(value, float) and np.isnan(value) else value
 
 
 def _share(part: float, whole: int) -> list[float]:
-    """A share with its 95 % interval."""
+    """Return a share with its 95 % interval."""
     if not whole:
         return [float("nan")] * 3
     return [part / whole, *interval(part / whole, whole)]
 
 
 def _middle(values: Sequence[float]) -> list[float]:
-    """An interquartile mean with its 95 % interval."""
+    """Return an interquartile mean with its 95 % interval."""
     if not len(values):
         return [float("nan")] * 3
     rows = np.array(values)
     return [iqm(rows), *bootstrap(rows, iqm, resamples=RESAMPLES)]
+
+
+def _spread(values: Sequence[float]) -> float:
+    """Return the standard deviation; nan for no values."""
+    return float(np.std(values)) if len(values) else float("nan")
 
 
 def _number(value: float, digits: int) -> str:
@@ -230,7 +234,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def shown(values: Sequence[float], digits: int) -> str:
-    """A figure with its interval, if it has one; "-" for none."""
+    """Return a value with its interval, if it has one, as text; "-" for nan."""
     middle, low, high = values
     if np.isnan(middle):
         return "-"

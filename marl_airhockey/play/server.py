@@ -1,4 +1,4 @@
-"""The web server of a session: one page, one WebSocket, and who may come in."""
+"""Web server of a session: one page, one WebSocket, and a check of who may connect."""
 
 from __future__ import annotations
 
@@ -20,30 +20,35 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.play.client import Client
 from marl_airhockey.play.protocol import LARGEST
-from marl_airhockey.play.session import Guest, Session
+from marl_airhockey.play.session import Session
 
 WEB = Path(__file__).parent / "web"
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]", "::1")
 STALLED = 10.0
-"""s after which a page that takes no frame is cut off."""
-MOST = 200
-"""Pages at once."""
-POLICY = (
+"""Time after which a page that takes no frame is disconnected, s."""
+MAX_CLIENTS = 200
+"""Most pages at once."""
+CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 
 
-class Door:
-    """Lets in pages of our own, and from other machines only with the token."""
+class AccessCheck:
+    """Check of requests: our own pages alone, other machines only with the token.
+
+    Args:
+        host: address that the server listens at.
+    """
 
     def __init__(self, host: str) -> None:
         self.local = host in LOOPBACK
         self.token = "" if self.local else secrets.token_urlsafe(12)
 
-    def refuses(self, request: HTTPConnection) -> str | None:
-        """Why a request is not let in, if it is not."""
+    def refusal(self, request: HTTPConnection) -> str | None:
+        """Return the reason to refuse a request; None to accept it."""
         name = request.headers.get("host", "")
         # Without a token, a foreign page must not reach us under a name of its own.
         if self.local and _hostname(name) not in LOOPBACK:
@@ -61,46 +66,49 @@ def _hostname(host: str) -> str:
     return urlsplit(f"//{host}").hostname or ""
 
 
-def _page(door: Door, mode: str, *routes: BaseRoute) -> list[BaseRoute]:
-    """The routes of the page in a mode, "live" or "replay", and others of its."""
+def _page(access: AccessCheck, mode: str, *routes: BaseRoute) -> list[BaseRoute]:
+    """Return the routes of the page in a mode, "live" or "replay", and further ones."""
 
     async def page(request: Request) -> Response:
-        reason = door.refuses(request)
+        reason = access.refusal(request)
         if reason is not None:
             return PlainTextResponse(reason + "\n", 403)
         return FileResponse(
-            WEB / "page.html", headers={"Content-Security-Policy": POLICY}
+            WEB / "page.html",
+            headers={"Content-Security-Policy": CONTENT_SECURITY_POLICY},
         )
 
-    async def say_mode(_: Request) -> Response:
+    async def mode_of_page(_: Request) -> Response:
         return JSONResponse({"mode": mode})
 
     files = Mount("/web", StaticFiles(directory=WEB))
-    return [Route("/", page), Route("/mode", say_mode), *routes, files]
+    return [Route("/", page), Route("/mode", mode_of_page), *routes, files]
 
 
-def replay(path: Path, door: Door) -> Starlette:
-    """The web application that shows a recording.
+def replay(path: Path, access: AccessCheck) -> Starlette:
+    """Return the web application that shows a recording.
 
     Raises:
-        ValueError: no recording.
+        ValueError: no recording, or one without steps.
     """
     meta, steps, end = read(path)
     if not steps:
         raise ValueError(f"{path}: there are no steps in it")
     recording = {"meta": meta, "steps": steps, "end": end}
 
-    async def give(request: Request) -> Response:
-        reason = door.refuses(request)
+    async def send_recording(request: Request) -> Response:
+        reason = access.refusal(request)
         if reason is not None:
             return PlainTextResponse(reason + "\n", 403)
         return JSONResponse(recording)
 
-    return Starlette(routes=_page(door, "replay", Route("/recording", give)))
+    return Starlette(
+        routes=_page(access, "replay", Route("/recording", send_recording))
+    )
 
 
-def application(session: Session, door: Door) -> Starlette:
-    """The web application of a session; its court ticks while the application lives."""
+def application(session: Session, access: AccessCheck) -> Starlette:
+    """Return the web application of a session, whose loop runs as long as it does."""
 
     @contextlib.asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -109,68 +117,68 @@ def application(session: Session, door: Door) -> Starlette:
         yield
         loop.cancel()
         if session.recorder is not None:
-            session.recorder.end(session.court, "the server was stopped")
-        session.court.close()
+            session.recorder.end(session.match, "the server was stopped")
+        session.match.close()
 
-    async def talk(socket: WebSocket) -> None:
-        reason = door.refuses(socket)
+    async def connection(socket: WebSocket) -> None:
+        reason = access.refusal(socket)
         if reason is not None:
             await socket.close(1008, reason)
             return
-        if len(session.guests) >= MOST:
+        if len(session.clients) >= MAX_CLIENTS:
             await socket.close(1013, "too many are watching")
             return
         await socket.accept()
-        guest = session.join()
-        writer = asyncio.create_task(_write(socket, session, guest))
+        client = session.connect()
+        writer = asyncio.create_task(_write(socket, session, client))
         try:
             while (message := await socket.receive())["type"] == "websocket.receive":
-                session.hear(guest, message.get("text") or "")
+                session.receive(client, message.get("text") or "")
         except ValueError as error:
             with contextlib.suppress(RuntimeError):
                 await socket.close(1008, str(error)[:120])
         finally:
-            session.part(guest)
+            session.disconnect(client)
             writer.cancel()
 
-    routes = _page(door, "live", WebSocketRoute("/ws", talk))
+    routes = _page(access, "live", WebSocketRoute("/ws", connection))
     return Starlette(routes=routes, lifespan=lifespan)
 
 
 def _note_failure(session: Session, task: asyncio.Task[None]) -> None:
-    """A loop that dies takes the server with it: nobody plays at a dead table."""
+    """Stop the server when the loop has failed: nobody plays at a dead table."""
     if not task.cancelled():
         session.failure = task.exception()
         signal.raise_signal(signal.SIGINT)
 
 
-async def _write(socket: WebSocket, session: Session, guest: Guest) -> None:
-    """Send a guest the newest frame whenever the last one is through."""
+async def _write(socket: WebSocket, session: Session, client: Client) -> None:
+    """Send a page the newest frame whenever the last one has been sent."""
     try:
-        await socket.send_json({"t": "court", **session.describe()})
+        await socket.send_json({"t": "match", **session.describe()})
         while True:
-            await guest.news.wait()
-            guest.news.clear()
-            await asyncio.wait_for(socket.send_text(guest.frame), STALLED)
+            await client.frame_ready.wait()
+            client.frame_ready.clear()
+            await asyncio.wait_for(socket.send_text(client.frame), STALLED)
     except (WebSocketDisconnect, RuntimeError, TimeoutError):
         with contextlib.suppress(RuntimeError):
             await socket.close(1001)
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """A listening socket.
+    """Return a listening TCP socket.
 
     Raises:
         ValueError: an address that is taken or not ours.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # Said to be TCP, so that asyncio turns Nagle's algorithm off: it would hold each
-    # frame back until the page has acknowledged the last one.
+    # With the protocol named, asyncio sets TCP_NODELAY: Nagle's algorithm would delay
+    # each frame until the page has acknowledged the last one.
     server = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         server.bind((host, port))
-        # Whoever is there before the server runs waits for it.
+        # Connections that come before the server runs wait for it.
         server.listen()
     except OSError as error:
         server.close()
@@ -179,7 +187,7 @@ def listen(host: str, port: int) -> socket.socket:
 
 
 def serve(app: Starlette, server: socket.socket) -> None:
-    """Serve until interrupted."""
+    """Serve an application at a listening socket until interrupted."""
     config = uvicorn.Config(
         app,
         log_level="error",

@@ -1,4 +1,4 @@
-"""A video of a recording."""
+"""Videos of recordings."""
 
 from __future__ import annotations
 
@@ -18,11 +18,16 @@ from marl_airhockey.render.renderer import Renderer
 from marl_airhockey.render.video import write_video
 
 EVERY = 2
-"""Control steps from one picture to the next: 30 pictures a second."""
+"""Control steps from one picture to the next; 2 give 30 pictures a second."""
 
 
-def film(recording: Path, video: Path, width: int = 640) -> None:
-    """Draw a recording as `airhockey watch` draws what is played now.
+def write_recording_video(recording: Path, video: Path, width: int = 640) -> None:
+    """Write a video of a recording, drawn as `airhockey watch` draws a game.
+
+    Args:
+        recording: its file.
+        video: the file to write, .gif or .mp4.
+        width: of the pictures, pixels.
 
     Raises:
         ValueError: no recording, or a video that ends in neither .gif nor .mp4.
@@ -30,7 +35,7 @@ def film(recording: Path, video: Path, width: int = 640) -> None:
     meta, steps, _ = read(recording)
     if not steps:
         raise ValueError(f"{recording}: there are no steps in it")
-    name = meta["court"]["scenario"]
+    name = meta["match"]["scenario"]
     scenario = make_scenario(name, **meta["options"])
     scene = scenario.scene
     blank = scene.still_state(1).map(lambda x: x[0])
@@ -50,7 +55,7 @@ def film(recording: Path, video: Path, width: int = 640) -> None:
             trails=[list(trail) for trail in trails],
             title=name.replace("_", " "),
             note=f"{row['caption']}   {row['time']:4.1f} s",
-            clock=row["time"] / meta["court"]["seconds"],
+            clock=row["time"] / meta["match"]["seconds"],
             success=bool(row["success"]),
             retired=[i in row["retired"] for i in range(len(scene.seats))],
         )
@@ -59,9 +64,10 @@ def film(recording: Path, video: Path, width: int = 640) -> None:
 
 
 def _state(blank: State, row: dict[str, Any]) -> State:
+    """Return a state with the positions and angles of a recorded step."""
     bodies = blank.bodies
     position, angle = blank.position.copy(), blank.angle.copy()
-    position[bodies.paddle] = row["pads"]
+    position[bodies.paddle] = row["paddles"]
     if row["pucks"]:
         position[bodies.puck] = np.array(row["pucks"])[:, :2]
     if row["blocks"]:

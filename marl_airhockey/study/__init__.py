@@ -1,1 +1,1 @@
-"""Studies: people play against opponents in an order that a plan says."""
+"""Studies: people play against opponents in the order of a plan."""

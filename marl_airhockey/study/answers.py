@@ -1,4 +1,4 @@
-"""What the diaries of a study say: who was met, what was answered."""
+"""Games and answers of a study, from its diaries."""
 
 from __future__ import annotations
 
@@ -16,63 +16,74 @@ from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.evaluation.stats import bootstrap, interval
 from marl_airhockey.play.report import RESAMPLES, shown
 from marl_airhockey.study.archive import diaries
-from marl_airhockey.study.plan import POINTS
+from marl_airhockey.study.plan import SCALE_POINTS
+from marl_airhockey.types import Array
 
 GAMES = (
     *("participant", "number", "complete", "block", "game", "practice", "opponent"),
     *("result", "score", "seconds", "pauses", "recording", "at"),
 )
+"""Columns of a game."""
 ANSWERS = (
     *("participant", "number", "complete", "block", "opponent"),
     *("question", "value", "choice", "at"),
 )
+"""Columns of an answer."""
 FEWEST = 5
 """Answers from which a mean has an interval."""
 
 
 @dataclass(frozen=True)
 class Answers:
-    """Rows as they are written to disk, and how many participants came to the end."""
+    """Games and answers as rows, and counts of participants."""
 
     games: list[dict[str, Any]]
-    """Of `GAMES`; result "broken off", or "won", "lost", "drawn" by the participant"""
+    """Rows of `GAMES`; the participant's result: won, lost, drawn, broken off."""
     answers: list[dict[str, Any]]
-    """Of `ANSWERS`"""
+    """Rows of `ANSWERS`."""
     participants: int
     complete: int
+    """Number of participants who came to the end."""
 
     def table(self) -> list[dict[str, Any]]:
-        """By question and opponent: the mean answer, 1 to 7, with its 95 % interval.
+        """Return rows by question and opponent: the mean answer, 1 to 7.
+
+        ``mean`` is a list (mean, low, high) with the 95 % interval, nan without one.
 
         A question with choices has a row for each choice instead: the share that chose
-        it. ``scale`` is the largest value.
+        it. ``scale`` is the largest possible value.
         """
         rows = []
-        asked = dict.fromkeys(row["question"] for row in self.answers)
-        met = sorted({row["opponent"] for row in self.answers})
-        for question, opponent in itertools.product(asked, met):
-            mine = [
+        questions = dict.fromkeys(row["question"] for row in self.answers)
+        opponents = sorted({row["opponent"] for row in self.answers})
+        for question, opponent in itertools.product(questions, opponents):
+            found = [
                 row
                 for row in self.answers
                 if (row["question"], row["opponent"]) == (question, opponent)
             ]
-            of = {"opponent": opponent, "n": len(mine)}
-            chosen = [row["choice"] for row in mine if row["choice"]]
+            group = {"opponent": opponent, "n": len(found)}
+            chosen = [row["choice"] for row in found if row["choice"]]
             for choice in sorted(set(chosen)):
                 share = chosen.count(choice) / len(chosen)
                 middle = [share, *interval(share, len(chosen))]
                 name = f"{question}: {choice}"
-                rows.append({"question": name, **of, "scale": 1, "mean": middle})
-            if mine and not chosen:
-                values = np.array([row["value"] for row in mine])
+                rows.append({"question": name, **group, "scale": 1, "mean": middle})
+            if found and not chosen:
+                values = np.array([row["value"] for row in found])
                 middle = [float(values.mean()), *_bounds(values)]
                 rows.append(
-                    {"question": question, **of, "scale": POINTS, "mean": middle}
+                    {
+                        "question": question,
+                        **group,
+                        "scale": SCALE_POINTS,
+                        "mean": middle,
+                    }
                 )
         return rows
 
     def to_markdown(self) -> str:
-        """A table."""
+        """Return a table with a legend."""
         lines = [
             f"# {self.participants} participants, {self.complete} to the end",
             "",
@@ -87,12 +98,16 @@ class Answers:
         lines += [
             "",
             "With a choice: the share that chose it (Wilson's interval). Others: means "
-            f"of 1 to {POINTS} (bootstrap, from {FEWEST} answers on).",
+            f"of 1 to {SCALE_POINTS} (bootstrap, from {FEWEST} answers on).",
         ]
         return "\n".join(lines) + "\n"
 
     def save(self, folder: Path) -> list[Path]:
-        """Write ``games.csv``, ``answers.csv``, ``answers.md`` and ``answers.png``."""
+        """Write ``games.csv``, ``answers.csv``, ``answers.md``, ``answers.png``.
+
+        Returns:
+            Their paths.
+        """
         folder.mkdir(parents=True, exist_ok=True)
         files = [
             folder / name
@@ -105,6 +120,7 @@ class Answers:
         return files
 
     def _draw(self, path: Path) -> None:
+        """Write a PNG of `table`, a panel for each question."""
         rows = self.table()
         questions = list(dict.fromkeys(row["question"] for row in rows))
         opponents = list(dict.fromkeys(row["opponent"] for row in rows))
@@ -134,8 +150,8 @@ class Answers:
                     fontsize=7,
                 )
             axes.set(
-                xlim=(-0.05, 1.05) if scale == 1 else (0.7, POINTS + 0.3),
-                xticks=(0, 0.5, 1) if scale == 1 else range(1, POINTS + 1),
+                xlim=(-0.05, 1.05) if scale == 1 else (0.7, SCALE_POINTS + 0.3),
+                xticks=(0, 0.5, 1) if scale == 1 else range(1, SCALE_POINTS + 1),
                 xlabel=question,
             )
             axes.set_yticks(range(len(opponents)), opponents)
@@ -143,13 +159,15 @@ class Answers:
         save(figure, path)
 
 
-def _bounds(values: Any) -> tuple[float, float]:
+def _bounds(values: Array) -> tuple[float, float]:
+    """Return the 95 % interval of a mean; nan for fewer than `FEWEST` values."""
     if len(values) < FEWEST:
         return float("nan"), float("nan")
     return bootstrap(values, lambda x: float(np.mean(x)), resamples=RESAMPLES)
 
 
 def _write(path: Path, names: Sequence[str], rows: list[dict[str, Any]]) -> None:
+    """Write rows as CSV."""
     with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, names)
         writer.writeheader()

@@ -1,8 +1,8 @@
-"""What a study keeps of its participants: a folder each, and how it is erased.
+"""Archive of a study: a folder for each person, and how it is erased.
 
 A folder ``participant-007`` holds ``diary.jsonl`` (a head, then consent, games and
-answers, a line each) and the recordings of that participant's games. Whoever plays as
-an opponent has a folder ``partner-000`` with the consent alone.
+answers, a line each) and the recordings of that participant's games. A person who plays
+as an opponent has a folder ``partner-000`` with the consent alone.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ from marl_airhockey.evaluation.recordings import head
 from marl_airhockey.study.plan import Plan
 
 FORMAT = 1
+"""Version of the format of diaries."""
 DIARY = "diary.jsonl"
 REPORTS = (
     *(f"report.{kind}" for kind in ("json", "md", "png")),
     *("games.csv", "answers.csv", "answers.md", "answers.png"),
 )
-"""What `airhockey record report` writes."""
+"""Files that `airhockey record report` writes."""
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
-"""Of codes; none that is mistaken for another."""
+"""Characters of codes; none that is mistaken for another."""
 
 
 class Diary:
-    """What is noted of one person; every line is on the disk when it is written.
+    """Notes on one person; every line is on the disk when `write` returns.
 
     Args:
         folder: of the person.
@@ -44,16 +45,16 @@ class Diary:
 
     @classmethod
     def begin(cls, study: Path, role: str, plan: Plan, page: str) -> Diary:
-        """A new one, with the consent that has just been given.
+        """Begin a diary with the consent that has just been given.
 
         Args:
             study: its folder.
             role: "participant" or "partner".
             plan: of the study; a participant's order is that of the lowest free number,
-                so that whoever is erased leaves no gap in the counterbalancing.
+                so that an erased person leaves no gap in the counterbalancing.
             page: key of the person's page, of which a digest is kept.
         """
-        number, folder = _claim(study, role)
+        number, folder = _new_folder(study, role)
         diary = cls(folder, [])
         diary.write(
             "diary",
@@ -62,33 +63,33 @@ class Diary:
             code="".join(secrets.choice(LETTERS) for _ in range(8)),
             number=number,
             plan=plan.digest,
-            page=digest(page),
+            page=page_digest(page),
         )
         diary.write("consent", version=plan.version)
         return diary
 
     @property
     def code(self) -> str:
-        """By which the person is known, drawn at random."""
+        """Random code by which the person is known."""
         return str(self.rows[0]["code"])
 
     @property
     def number(self) -> int:
-        """Of the participant, from 0."""
+        """Number of the participant, from 0."""
         return int(self.rows[0]["number"])
 
     @property
-    def over(self) -> bool:
-        """Whether the person has come to the end, or has left."""
+    def ended(self) -> bool:
+        """True if the person has come to the end, or has left."""
         return any(row["kind"] == "end" for row in self.rows)
 
     @property
-    def there(self) -> bool:
-        """Whether it is still on the disk: somebody may have erased it."""
+    def exists(self) -> bool:
+        """True if it is still on the disk: somebody may have erased it."""
         return (self.folder / DIARY).exists()
 
     def write(self, kind: str, **row: Any) -> None:
-        """Add a line, with the time."""
+        """Add a line, with the time as ``at``."""
         now = datetime.datetime.now(datetime.UTC).isoformat()
         self.rows.append({"kind": kind, "at": now, **row})
         with (self.folder / DIARY).open("a") as file:
@@ -97,16 +98,16 @@ class Diary:
             os.fsync(file.fileno())
 
 
-def digest(page: str) -> str:
-    """Of the key of a page, by which it is known again."""
+def page_digest(page: str) -> str:
+    """Return the digest of a page's key, by which the page is recognised."""
     return hashlib.sha256(page.encode()).hexdigest()[:16]
 
 
-def claim(folder: Path, plan: Path) -> None:
-    """Make a folder that of a plan, of which a copy is kept there.
+def claim_folder(folder: Path, plan: Path) -> None:
+    """Reserve a folder for a plan, of which a copy is kept there.
 
     Raises:
-        ValueError: it is another plan's, or cannot be written.
+        ValueError: a folder of another plan, or one that cannot be written.
     """
     copy = folder / "plan.toml"
     try:
@@ -122,8 +123,11 @@ def claim(folder: Path, plan: Path) -> None:
         )
 
 
-def _claim(folder: Path, role: str) -> tuple[int, Path]:
-    """The lowest free number, and its folder; servers of one study may race for it."""
+def _new_folder(folder: Path, role: str) -> tuple[int, Path]:
+    """Make a folder of the lowest free number; return both.
+
+    Several servers of one study may do so at the same time.
+    """
     number = 0
     while True:
         own = folder / f"{role}-{number:03d}"
@@ -136,10 +140,10 @@ def _claim(folder: Path, role: str) -> tuple[int, Path]:
 
 
 def diaries(folder: Path) -> Iterator[Diary]:
-    """The diaries of a study.
+    """Yield the diaries of a study.
 
     Raises:
-        ValueError: one of another format.
+        ValueError: a diary of another format.
     """
     for path in sorted(folder.glob(f"*/{DIARY}")):
         rows = []
@@ -147,36 +151,36 @@ def diaries(folder: Path) -> Iterator[Diary]:
             try:
                 rows.append(json.loads(line))
             except json.JSONDecodeError:
-                break  # The last line of a machine that went down.
+                break  # The last line before the machine went down.
         if rows and rows[0]["format"] != FORMAT:
             raise ValueError(f"{path}: format {rows[0]['format']}, expected {FORMAT}")
         if rows:
             yield Diary(path.parent, rows)
 
 
-def erase(folder: Path, who: str) -> int:
-    """Delete all that is kept of a person; how many files it was.
+def erase(folder: Path, code: str) -> int:
+    """Delete all that is kept of a person; return the number of files.
 
     The games that the person played as somebody's opponent go, too, and reports that
     were made in the folder. A line without a code stays in ``erased.jsonl``: when it
     was, and of which number.
 
     Raises:
-        ValueError: nothing of this person is there.
+        ValueError: a code of which there is nothing.
     """
     gone = 0
     number = None
     for diary in list(diaries(folder)):
-        if diary.code == who:
+        if diary.code == code:
             number = diary.number
             gone += sum(p.is_file() for p in diary.folder.rglob("*"))
             shutil.rmtree(diary.folder)
     for path in list(folder.rglob("*.jsonl")):
-        if who in [player["person"] for player in head(path).get("players", [])]:
+        if code in [player["person"] for player in head(path).get("players", [])]:
             path.unlink()
             gone += 1
     if not gone:
-        raise ValueError(f"{folder}: there is nothing of {who!r}")
+        raise ValueError(f"{folder}: there is nothing of {code!r}")
     for name in REPORTS:
         (folder / name).unlink(missing_ok=True)
     with (folder / "erased.jsonl").open("a") as log:

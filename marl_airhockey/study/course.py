@@ -1,4 +1,4 @@
-"""A participant's way through a plan: practice, blocks of games, questions, breaks."""
+"""Course of a participant: practice, blocks of games, questions, breaks."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 from marl_airhockey.study.archive import Diary
 from marl_airhockey.study.plan import Opponent, Plan
 
-VERDICT = 2.5
-"""s for which the end of a game is shown before what comes next."""
-BROKEN = "broken off"
+RESULT_SHOWN = 2.5
+"""Time for which the result of a game is shown, s."""
+BROKEN_OFF = "broken off"
 """Result of a game that does not count."""
 
 
 class Course:
-    """Where a participant is in a plan; goes on from what the diary says.
+    """Position of a participant in a plan; resumes where the diary ends.
 
     Args:
         plan: of the study.
@@ -24,24 +24,26 @@ class Course:
     def __init__(self, plan: Plan, diary: Diary) -> None:
         self.plan, self.diary = plan, diary
         self.stage = "ready"
-        """ready, match, over, questions, rest, end"""
-        self.left = 0.0
-        """s of a rest, or of the sight of a verdict."""
-        self.block, self.game = 0, 0
-        """The block, -1 for practice; how many of its games are over."""
+        """One of: ready, match, over, questions, rest, end."""
+        self.time_left = 0.0
+        """Rest of a break, or of the time for which a result is shown, s."""
+        self.block = 0
+        """Index of the block; -1 for practice."""
+        self.game = 0
+        """Number of this block's games that are over."""
         self._answers: dict[str, int] = {}
-        self._enter(-1 if plan.practice else 0)
+        self._begin_block(-1 if plan.practice else 0)
         for row in list(diary.rows):
-            self._follow(row)
+            self._replay(row)
 
     @property
     def games(self) -> int:
-        """Of this block."""
+        """Number of games of this block."""
         return self.plan.practice if self.block < 0 else self.plan.games
 
     @property
     def opponent(self) -> Opponent | None:
-        """Whom the participant meets in this block; nobody in a game of one seat."""
+        """Opponent of this block; None in a game of one seat, and at the end."""
         plan, block = self.plan, self.block
         if not plan.opponents or block == plan.blocks:
             return None
@@ -51,7 +53,7 @@ class Course:
 
     @property
     def title(self) -> str:
-        """What the participant may know of the opponent."""
+        """Name of the opponent that the participant sees."""
         if self.opponent is None:
             return ""
         if not self.plan.blind:
@@ -59,8 +61,8 @@ class Course:
         return "Practice" if self.block < 0 else f"Opponent {self.block + 1}"
 
     @property
-    def place(self) -> dict[str, Any]:
-        """Where the participant is, for recordings and the diary."""
+    def position(self) -> dict[str, Any]:
+        """Position in the plan as recordings and the diary have it, counted from 1."""
         return {
             "block": self.block + 1,
             "game": self.game + 1,
@@ -69,76 +71,76 @@ class Course:
         }
 
     def begin(self) -> None:
-        """The next game of the block."""
+        """Begin the next game of the block."""
         self.stage = "match"
 
-    def note(self, result: str, **facts: Any) -> None:
-        """A game is over; one that was broken off is played again."""
-        self.diary.write("game", **self.place, result=result, **facts)
-        self.game += result != BROKEN
-        self.stage, self.left = "over", VERDICT
+    def end_game(self, result: str, **facts: Any) -> None:
+        """Note a game in the diary; one that was broken off is played again."""
+        self.diary.write("game", **self.position, result=result, **facts)
+        self.game += result != BROKEN_OFF
+        self.stage, self.time_left = "over", RESULT_SHOWN
 
-    def wait(self, seconds: float) -> None:
-        """Let time pass: a verdict was seen, a rest may be over."""
-        self.left = max(self.left - seconds, 0.0)
-        if self.left == 0.0 and self.stage == "over":
-            self._lead_on()
-        elif self.left == 0.0 and self.stage == "rest":
+    def advance(self, seconds: float) -> None:
+        """Advance the clock; it ends the display of a result and a break."""
+        self.time_left = max(self.time_left - seconds, 0.0)
+        if self.time_left == 0.0 and self.stage == "over":
+            self._next_stage()
+        elif self.time_left == 0.0 and self.stage == "rest":
             self.stage = "ready"
 
     def answer(self, question: str, value: int) -> None:
         """Take an answer; with the last one the block is over.
 
         Raises:
-            ValueError: a question, or a value, that the plan does not have.
+            ValueError: a question or a value that the plan does not have.
         """
-        asked = {q.id: q for q in self.plan.questions}
-        if question not in asked or not 1 <= value <= asked[question].most:
-            raise ValueError(f"answer: {question} {value} is not asked for")
+        questions = {q.id: q for q in self.plan.questions}
+        if question not in questions or not 1 <= value <= questions[question].largest:
+            raise ValueError(f"answer: {question} {value} is not in the plan")
         if self.stage != "questions":
             return
         self._answers[question] = value
-        if self._answers.keys() < asked.keys():
+        if self._answers.keys() < questions.keys():
             return
-        place = self.place
+        position = self.position
         for name, given in self._answers.items():
-            choices = asked[name].choices
+            choices = questions[name].choices
             self.diary.write(
                 "answer",
-                block=place["block"],
-                opponent=place["opponent"],
+                block=position["block"],
+                opponent=position["opponent"],
                 question=name,
                 value=given,
                 choice=choices[given - 1] if choices else "",
             )
-        self._enter(self.block + 1)
+        self._begin_block(self.block + 1)
 
-    def _enter(self, block: int) -> None:
+    def _begin_block(self, block: int) -> None:
         """Begin a block; -1 is practice."""
         self.block, self.game, self._answers = block, 0, {}
         if block == self.plan.blocks:
             self.stage = "end"
-            if not self.diary.over:
+            if not self.diary.ended:
                 self.diary.write("end", reason="complete")
             return
-        self.left = self.plan.rest if block > 0 else 0.0
-        self.stage = "rest" if self.left else "ready"
+        self.time_left = self.plan.rest if block > 0 else 0.0
+        self.stage = "rest" if self.time_left else "ready"
 
-    def _lead_on(self) -> None:
-        """To the next game, the questions or the next block."""
+    def _next_stage(self) -> None:
+        """Begin the next game, the questions or the next block."""
         self.stage = "ready"
         if self.game == self.games:
             if self.block < 0 or not self.plan.questions:
-                self._enter(self.block + 1)
+                self._begin_block(self.block + 1)
             else:
                 self.stage = "questions"
 
-    def _follow(self, row: dict[str, Any]) -> None:
-        """Go through what a line of the diary tells."""
-        if row["kind"] == "game" and row["result"] != BROKEN:
+    def _replay(self, row: dict[str, Any]) -> None:
+        """Repeat what a line of the diary has noted."""
+        if row["kind"] == "game" and row["result"] != BROKEN_OFF:
             self.game += 1
-            self._lead_on()
+            self._next_stage()
         elif row["kind"] == "answer":
             self._answers[row["question"]] = row["value"]
             if self._answers.keys() >= {q.id for q in self.plan.questions}:
-                self._enter(self.block + 1)
+                self._begin_block(self.block + 1)

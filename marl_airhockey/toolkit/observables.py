@@ -51,8 +51,8 @@ class OtherPaddles(Observable):
     def write(self, ego: EgoView, out: Array) -> None:
         order = _others(ego.scope.scene)
         rows = np.arange(len(order))[:, None]
-        place = ego.turn(ego.state.paddle)[..., rows, order, :]
-        motion = ego.turn(ego.state.paddle_velocity)[..., rows, order, :]
+        place = ego.rotate(ego.state.paddle)[..., rows, order, :]
+        motion = ego.rotate(ego.state.paddle_velocity)[..., rows, order, :]
         both = np.concatenate([place, motion], -1)
         out[...] = both.reshape(out.shape)
 
@@ -99,7 +99,7 @@ class Pucks(Observable):
             return
         lead = ego.history.shape[:-3]
         flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 3)
-        place = ego.turn(flat[..., :2])
+        place = ego.rotate(flat[..., :2])
         seen = np.broadcast_to(flat[..., None, :, 2:], (*place.shape[:-1], 1))
         both = np.concatenate([place, seen], -1)
         out[...] = both.reshape(out.shape)
@@ -129,7 +129,7 @@ class Blocks(Observable):
         return [c for name in names for c in scope.place(name, (0.3, 0.2), self.x)]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        out[...] = ego.turn(ego.state.block).reshape(out.shape)
+        out[...] = ego.rotate(ego.state.block).reshape(out.shape)
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class PuckToBlocks(Observable):
         return [c for name in names for c in scope.gap(name, (1.0, 0.5))]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        gap = ego.turn(ego.state.block) - ego.puck[..., :1, :]
+        gap = ego.rotate(ego.state.block) - ego.puck[..., :1, :]
         out[...] = gap.reshape(out.shape)
 
 
@@ -175,7 +175,7 @@ class Goal(Observable):
         )
 
     def write(self, ego: EgoView, out: Array) -> None:
-        goal = ego.turn(ego.memory["goal"][..., None, :])[..., 0, :]
+        goal = ego.rotate(ego.memory["goal"][..., None, :])[..., 0, :]
         out[..., :2] = goal
         out[..., 2:] = goal - (ego.own if self.origin == "own" else ego.puck[..., 0, :])
 
@@ -192,7 +192,7 @@ class GoalVelocity(Observable):
         return scope.motion("goal", self.most, self.unit)
 
     def write(self, ego: EgoView, out: Array) -> None:
-        out[...] = ego.turn(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
+        out[...] = ego.rotate(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def shots_at(rng: RandomStreams, scene: Scene, state: State) -> Array:
 
 
 def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]:
-    """Shoot once at each puck: a random goal moment (W, 4), and whether there is one."""
+    """Shoot once at each puck: a random goal moment (W, 4), and if there is one."""
     table, physics = scene.table, {k: p.default for k, p in PARAMETERS.items()}
     physics.update(scene.defaults)
     ways = (

@@ -74,7 +74,7 @@ class Field:
     def of(scene: Scene, seat: int) -> Field:
         """As a seat sees it."""
         table, me = scene.table, scene.seats[seat]
-        turn = table.rotation(me.side)
+        rotation = table.rotation(me.side)
         teams = {s.side: s.team for s in scene.seats}
         keep, points = np.inf, []
         for goal_line in scene.goal_lines:
@@ -90,7 +90,7 @@ class Field:
             points += [middle + share * spread * along for share in (-1.0, 0.0, 1.0)]
         box = len(table.vertices) == 4 and me.side in (0, 2)
         half = float(table.size[1]) / 2 - table.puck_radius if box else np.inf
-        targets = np.array(points).reshape(-1, 2) @ turn.T
+        targets = np.array(points).reshape(-1, 2) @ rotation.T
         return Field(-float(table.offsets[me.side]), half, keep, targets)
 
     def fold(self, y: Array) -> Array:

@@ -98,15 +98,15 @@ def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
     names = set()
     for path in paths:
         meta, steps, _ = read(path)
-        names.add(meta["court"]["scenario"])
-        scenario = make_scenario(meta["court"]["scenario"], **meta["options"])
+        names.add(meta["match"]["scenario"])
+        scenario = make_scenario(meta["match"]["scenario"], **meta["options"])
         position = np.array(
-            [row["pads"] + [p[:2] for p in row["pucks"]] for row in steps]
+            [row["paddles"] + [p[:2] for p in row["pucks"]] for row in steps]
         )
         velocity = np.array(
-            [row["pad_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
+            [row["paddle_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
         )
-        command = np.array([row["sent"] for row in steps])
+        command = np.array([row["command"] for row in steps])
         follows = np.arange(len(steps)) > 0
         parts.append((position, velocity, command, follows))
     if len(names) != 1:

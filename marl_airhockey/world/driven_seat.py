@@ -1,4 +1,4 @@
-"""Driven seats: seats inside the environment, each with a driver."""
+"""DrivenSeat seats: seats inside the environment, each with a driver."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marl_airhockey.world.observer import Observer
 
 
 class DrivenSeat:
-    """Driven seat of B worlds: its driver, the driver's memory and pace.
+    """DrivenSeat seat of B worlds: its driver, the driver's memory and pace.
 
     Raises:
         ValueError: a driver whose control_dt is no multiple of the environment's.

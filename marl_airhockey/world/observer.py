@@ -94,7 +94,7 @@ class Observer:
         return self.take(shown, seats)
 
     def take(self, shown: Sink, seats: Array) -> Observation:
-        """Return the observations of some seats from those of all, which it takes over."""
+        """Return the observations of some seats from those of all, used up."""
         if len(seats) != len(self.scenario.scene.seats):
             shown["flat"] = shown["flat"][:, seats]
         if len(shown) == 1:
@@ -105,7 +105,7 @@ class Observer:
     def show(self, state: State, memory: Memory) -> Sink:
         """Return the observations of all seats from the true state.
 
-        An empty dict if they need the sensor, a history or pixels (`read` is used then).
+        Empty if they need the sensor, a history or pixels (`read` is used then).
         """
         if self.observe != "velocity" or not self.sensor.ideal:
             return {}
@@ -169,10 +169,10 @@ class Observer:
         for b, world in enumerate(frames):
             goal = memory["goal"][b] if "goal" in memory else None
             for row, seat in enumerate(seats):
-                turn = scene.table.rotation(scene.seats[seat].side)
+                rotation = scene.table.rotation(scene.seats[seat].side)
                 for k in range(FRAMES):
                     out[b, row, :, :, k] = small_picture(
-                        scene, world[k], goal, turn, int(seat), PIXELS
+                        scene, world[k], goal, rotation, int(seat), PIXELS
                     )
         return out
 

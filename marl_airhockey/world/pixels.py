@@ -13,7 +13,12 @@ SHIFT = 6
 
 
 def small_picture(
-    scene: Scene, position: Array, goal: Array | None, turn: Array, seat: int, size: int
+    scene: Scene,
+    position: Array,
+    goal: Array | None,
+    rotation: Array,
+    seat: int,
+    size: int,
 ) -> Array:
     """What a seat sees as pixels: (size, size) uint8 grey, ego frame.
 
@@ -21,17 +26,17 @@ def small_picture(
         scene: who is on the table.
         position: (N, 2) sensed positions, table frame, m.
         goal: (2,) wanted place, or None.
-        turn: (2, 2) from the table frame to the seat's ego frame.
+        rotation: (2, 2) from the table frame to the seat's ego frame.
         seat: the seat's index; its own paddle is the brighter one.
         size: pixels.
     """
     image = np.zeros((size, size), np.uint8)
-    corners = np.asarray(scene.table.vertices) @ turn.T
+    corners = np.asarray(scene.table.vertices) @ rotation.T
     extent = float(np.abs(corners).max())
     scale = (size / 2 - 1) / extent
 
     def pixel(point: Array) -> tuple[int, int]:
-        x, y = turn @ point * scale
+        x, y = rotation @ point * scale
         return round((size / 2 + x) * 2**SHIFT), round((size / 2 - y) * 2**SHIFT)
 
     outline = np.array([pixel(np.asarray(c)) for c in scene.table.vertices], np.int32)

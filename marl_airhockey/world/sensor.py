@@ -49,7 +49,7 @@ class Sensor:
         self.frames = np.zeros((num_worlds, FRAMES, len(scene.bodies), 2))
         """(B, FRAMES, N, 2) sensed positions of all bodies, newest last."""
         self.keeps_history = False
-        """True if `history` and `frames` are kept: only if an observation needs them."""
+        """True if `history` and `frames` are kept, as an observation needs them."""
 
     def reset(
         self, worlds: Array, state: State, values: dict[str, Array], rng: RandomStreams

@@ -65,8 +65,8 @@ class Camera:
         start = self._place.to_world(*mark.start, THIN)
         if mark.kind == "circle":
             kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [mark.radius, THIN, THIN]
-            turn = self._place.rotation.ravel()
-            mujoco.mjv_initGeom(geom, kind, size, start, turn, GREEN)
+            orientation = self._place.rotation.ravel()
+            mujoco.mjv_initGeom(geom, kind, size, start, orientation, GREEN)
         else:
             kind = (
                 mujoco.mjtGeom.mjGEOM_ARROW

@@ -115,7 +115,7 @@ class AirHockey(ManipulationEnv):
         names = [robots] * len(self.scene.seats) if isinstance(robots, str) else robots
         if list(names) != [ARM] * len(self.scene.seats):
             raise ValueError(
-                f"robots: {robots!r}; a scene of {len(self.scene.seats)} seats is played "
+                f"robots: {robots!r}; {len(self.scene.seats)} seats are played "
                 f"by as many {ARM}"
             )
         self.place = TableFrame(self.scene.defaults.get("tilt", 0.0))

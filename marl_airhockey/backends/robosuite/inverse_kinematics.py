@@ -48,9 +48,13 @@ def reach_for(
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
-        turn = rotation @ data.site_xmat[site].reshape(3, 3).T
+        r = rotation @ data.site_xmat[site].reshape(3, 3).T
         off = 0.5 * np.array(
-            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
+            [
+                error[2, 1] - error[1, 2],
+                error[0, 2] - error[2, 0],
+                error[1, 0] - error[0, 1],
+            ]
         )
         error = np.concatenate([target - data.site_xpos[site], off])
         if np.linalg.norm(error) < CLOSE:

@@ -28,9 +28,9 @@ class Gains:
     """1/s2, toward the table, of a paddle that has left it"""
     lift_ratio: float = 3.0
     """Damping ratio along the normal"""
-    turn: float = 1600.0
+    kp_orientation: float = 1600.0
     """1/s2, of the orientation"""
-    turn_ratio: float = 1.0
+    orientation_ratio: float = 1.0
     """Damping ratio of the orientation"""
     correction: float = 5.0
     """m/s2, largest acceleration beside that of the reference"""

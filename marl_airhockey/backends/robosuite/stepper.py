@@ -42,7 +42,7 @@ class Simulation(NamedTuple):
     bias: Array
     places: Array
     """(sites, 3)"""
-    turns: Array
+    orientations: Array
     """(sites, 9)"""
     sensors: Array
     arms: Array
@@ -122,8 +122,8 @@ def advance(
 
     Args:
         sim: of the world, `Simulation`.
-        table: `Table`.
-        report: `Report`, filled.
+        static: `StaticScene`.
+        output: `Report`, filled.
         start: (seats, 2) where the references begin, m.
         old: (seats, 2) m/s, of the references at the beginning.
         new: (seats, 2) m/s, at the end.
@@ -173,7 +173,7 @@ def advance(
                 bias,
                 speeds,
                 _local(static, sim.places[site]),
-                sim.turns[site].reshape(3, 3),
+                sim.orientations[site].reshape(3, 3),
                 static.rotation,
                 static.grips[s],
                 wanted,
@@ -235,7 +235,7 @@ def _see(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> None:
                 output.paddles[s, 2 + i] += static.rotation[j, i] * world[j]
         upright = 0.0
         for j in range(3):
-            upright += static.grips[s, j, 2] * sim.turns[site, 3 * j + 2]
+            upright += static.grips[s, j, 2] * sim.orientations[site, 3 * j + 2]
         row = output.trace[k, s]
         row[0], row[3] = position[2], fastest
         row[1] = np.arccos(min(upright, 1.0))

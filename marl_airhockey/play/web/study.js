@@ -1,8 +1,8 @@
 "use strict";
-// What a page shows in a study: texts to agree to, questions, breaks, the end.
+// Study: texts to agree to, questions, breaks, the end.
 
-let sheet = ""; // what the sheet over the table shows
-let leaving = false; // asked whether they mean to withdraw
+let sheet = ""; // key of SHEETS that covers the table
+let leaving = false; // true while the page asks for a confirmation of withdrawal
 
 const element = (tag, text = "", cls = "") => {
   const node = document.createElement(tag);
@@ -15,7 +15,7 @@ function another() { sessionStorage.removeItem("key"); location.reload(); }
 
 const SHEETS = {
   consent() {
-    const { title, information, agree, version } = court.study, go = button("Take part", () => say("consent", { version }));
+    const { title, information, agree, version } = match.study, go = button("Take part", () => send("consent", { version }));
     const boxes = agree.map((line) => {
       const label = element("label", "", "tick"), box = element("input");
       box.type = "checkbox"; label.append(box, line);
@@ -26,12 +26,12 @@ const SHEETS = {
     return [element("h1", title), ...information.map((text) => element("p", text)), ...boxes, go];
   },
   questions() {
-    const { questions } = court.study, go = button("Go on", send), fields = questions.map(ask);
-    function ask(question) {
+    const { questions } = match.study, go = button("Go on", sendAnswers), fields = questions.map(fieldOf);
+    function fieldOf(question) {
       const field = element("fieldset"), row = element("div", "", question.choices.length ? "choices" : "scale");
       field.append(element("legend", question.text), row);
       if (question.low) row.append(element("span", question.low, "end"));
-      for (let value = 1; value <= question.most; value++) {
+      for (let value = 1; value <= question.largest; value++) {
         const label = element("label"), dot = element("input");
         dot.type = "radio"; dot.name = question.id; dot.value = value;
         dot.onchange = () => { go.disabled = !fields.every((f) => f.querySelector("input:checked")); };
@@ -40,32 +40,32 @@ const SHEETS = {
       if (question.high) row.append(element("span", question.high, "end"));
       return field;
     }
-    function send() {
-      fields.forEach((f) => { const dot = f.querySelector("input:checked"); say("answer", { question: dot.name, value: Number(dot.value) }); });
+    function sendAnswers() {
+      fields.forEach((f) => { const dot = f.querySelector("input:checked"); send("answer", { question: dot.name, value: Number(dot.value) }); });
     }
     go.disabled = true;
     return [element("h1", "How was it?"), ...fields, go];
   },
   end() {
     return [
-      element("h1", "That was all"), element("p", court.study.thanks), element("p", `Your code is ${now.study.code}. With it you can have your data erased later.`),
-      button("Next participant", () => { say("next"); another(); }),
+      element("h1", "That was all"), element("p", match.study.thanks), element("p", `Your code is ${now.study.code}. With it you can have your data erased later.`),
+      button("Next participant", () => { send("next"); another(); }),
     ];
   },
   erased() {
-    return [element("h1", "Erased"), element("p", "All that was recorded of you has been erased. Thank you."), button("Next participant", () => { say("next"); another(); })];
+    return [element("h1", "Erased"), element("p", "All that was recorded of you has been erased. Thank you."), button("Next participant", () => { send("next"); another(); })];
   },
   leaving() {
     return [
       element("h1", "Withdraw?"), element("p", "This ends your part and erases at once all that was recorded of you."),
-      button("Erase everything", () => { leaving = false; say("withdraw"); }), button("Stay", () => { leaving = false; }),
+      button("Erase everything", () => { leaving = false; send("withdraw"); }), button("Stay", () => { leaving = false; }),
     ];
   },
 };
 
-function studyWords() {
+function updateStudyWords() {
   const { stage, code } = now.study, runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
-  for (const name of ["swap", "leave", "strength", "stop"]) $(name).hidden = true;
+  for (const name of ["swap", "leave", "handicap", "stop"]) $(name).hidden = true;
   put($("pause"), runs ? "Pause" : "Start");
   $("pause").disabled = !sits || !(stage === "match" || (stage === "ready" && !now.study.waits));
   $("withdraw").hidden = !code;
@@ -77,18 +77,18 @@ function studyWords() {
     sheet = wanted;
     $("sheet").replaceChildren(...(wanted ? SHEETS[wanted]() : []));
     $("sheet").hidden = !wanted; $("sheet").scrollTop = 0;
-    if (wanted && now.phase === "play") say("pause");
+    if (wanted && now.phase === "play") send("pause");
   }
   if (wanted) { $("notice").hidden = true; return; }
-  const { block, game, games, left, waits } = now.study, where = block < 0 ? "Practice" : `Part ${block + 1} of ${court.study.blocks}`;
+  const { block, game, games, time_left, waits } = now.study, where = block < 0 ? "Practice" : `Part ${block + 1} of ${match.study.blocks}`;
   if (down) show("No connection", refused || "trying again…", "");
   else if (stage === "busy") show("A session is running", "Please wait until it is over.", "");
   else if (stage === "partner" && now.phase !== "play" && now.phase !== "countdown" && now.phase !== "pause") show("Please wait", "You play in a part of this session. Thank you for taking part.", "");
   else if (stage === "partner" && !sits) show("Please wait", "You play in another part of this session.", "");
-  else if (stage === "rest") show("A break", `${where} begins in ${left} s.`, "");
+  else if (stage === "rest") show("A break", `${where} begins in ${time_left} s.`, "");
   else if (stage === "over") show(verdict(), now.reason, "");
   else if (stage === "ready" && waits) show(where, "Waiting for the other player.", "");
   else if (stage === "ready" && now.phase === "done" && game) show(verdict(), `${where}: game ${game + 1} of ${games} is next.`, "Next game");
-  else if (stage === "ready") show(where, `${court.what} ${games} ${games === 1 ? "game" : "games"}. Move the pointer to move your paddle. Space starts.`, "Start");
+  else if (stage === "ready") show(where, `${match.what} ${games} ${games === 1 ? "game" : "games"}. Move the pointer to move your paddle. Space starts.`, "Start");
   else notice(sits, -1, stage === "match");
 }

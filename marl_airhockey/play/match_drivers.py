@@ -1,0 +1,132 @@
+"""Drivers of a match: people by their input devices, and programs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.play.handicap import Handicap
+from marl_airhockey.registry import (
+    ZOO,
+    agent_names,
+    make_agent,
+    make_scenario,
+    zoo_names,
+)
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.types import Array
+from marl_airhockey.world.driven_seat import DrivenSeat
+from marl_airhockey.world.world import World
+
+PERSON = "person"
+"""Name of the driver of a seat that people take."""
+INPUT_DEVICES = ("mouse", "gamepad")
+"""Names of the drivers by which people steer."""
+
+
+class MatchDrivers:
+    """One driver for each seat of a world; people everywhere at first.
+
+    Args:
+        world: of one row.
+        profile: of the world, by which fitting policies are sorted.
+        handicap: of all programs.
+    """
+
+    def __init__(self, world: World, profile: str, handicap: Handicap) -> None:
+        self._world, self._profile, self.handicap = world, profile, handicap
+        seats = world.scene.seats
+        self.names = [PERSON for _ in seats]
+        """Name or path of the driver of each seat."""
+        self._device_kinds = ["mouse" for _ in seats]
+        self._devices: list[Driver] = [make_agent("mouse") for _ in seats]
+        self._driven = [self._build(i) for i in range(len(seats))]
+
+    @property
+    def choices(self) -> list[str]:
+        """Names of programs to choose from: fitting policies, then scripts."""
+        hidden = (*INPUT_DEVICES, "policy", "reacher")
+        scripts = [name for name in agent_names() if name not in hidden]
+        if len(self.names) > 1:
+            scripts += [
+                f"{name}:strength={strength}"
+                for name in ("allround", "striker", "goalkeeper")
+                for strength in ("weak", "fair")
+            ]
+        return [*self.fitting_policies, *scripts]
+
+    @cached_property
+    def fitting_policies(self) -> list[str]:
+        """Policies of the zoo for this game: same rules, seats and observations.
+
+        Those that were trained in the same profile come first.
+        """
+        scenario, observer = self._world.scenario, self._world.observer
+        found: list[tuple[bool, str]] = []
+        for name in zoo_names():
+            card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
+            labels = observer.prepare(card["observe"]).labels
+            seats = make_scenario(card["scenario"], **card["options"]).seats
+            if (card["scenario"], card["labels"], seats) == (
+                scenario.name,
+                list(labels),
+                scenario.seats,
+            ):
+                found.append((card["profile"] != self._profile, name))
+        return [name for _, name in sorted(found)]
+
+    def set(self, i: int, name: str) -> None:
+        """Give a seat to another driver; if it does not fit, the old one stays.
+
+        Raises:
+            ValueError: an unknown name, or a policy that does not fit.
+        """
+        if name in INPUT_DEVICES:
+            raise ValueError(f"{name} is a person's input device: say {PERSON}")
+        old_name, old = self.names[i], self._driven[i]
+        self.names[i] = name
+        try:
+            self._driven[i] = self._build(i)
+            self.reset([i])
+            self.action(i)  # A policy that does not fit fails here, not in a match.
+        except ValueError:
+            self.names[i], self._driven[i] = old_name, old
+            raise
+        old.driver.__exit__(None, None, None)
+
+    def input_device(self, i: int, kind: str) -> Driver:
+        """Return the driver by which a person steers a seat: "mouse" or "gamepad"."""
+        if self.names[i] == PERSON and self._device_kinds[i] != kind:
+            self._device_kinds[i], self._devices[i] = kind, make_agent(kind)
+            self._driven[i] = self._build(i)
+            self.reset([i])
+        return self._devices[i]
+
+    def reset(self, seats: Iterable[int]) -> None:
+        """Begin an episode for the drivers of some seats."""
+        one, world = np.zeros(1, np.int64), self._world
+        for i in seats:
+            self._driven[i].reset(one, world.seeds, world.episode.number)
+
+    def action(self, i: int) -> Array:
+        """Return the action of a seat, (1, 2) fractions of top speed, ego frame."""
+        world = self._world
+        return self._driven[i].act(
+            world.sensed, world.memory, world.episode.physics, world.episode.cycles
+        )
+
+    def close(self) -> None:
+        """Leave all drivers."""
+        for seat in self._driven:
+            seat.driver.__exit__(None, None, None)
+
+    def _build(self, i: int) -> DrivenSeat:
+        """Return a seat's driver, with the handicap if it is a program's."""
+        name, world = self.names[i], self._world
+        driver = self._devices[i]
+        if name != PERSON:
+            driver = self.handicap.apply(make_agent(name))
+        return DrivenSeat(i, driver, world.observer, 1, world.control_dt)

@@ -1,0 +1,84 @@
+"use strict";
+// Pointer, stick, keys and buttons; sounds.
+
+function aim(event) {
+  if (!fit) return;
+  const box = canvas.getBoundingClientRect();
+  pointer = fromScreen(event.clientX - box.left, event.clientY - box.top);
+  pointedAt = event.timeStamp;
+  steered = false;
+  // At once, not with the next frame: that would cost a hundredth of a second.
+  if (performance.now() - sentAt > 6) sendInput(performance.now());
+}
+
+function sendInput(at) {
+  if (!now || now.seat === null) return;
+  const pad = stick();
+  if (pad) { steered = true; pointer = null; sentAt = at; send("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: roundTrip || 0 }); pending.set(aimed, at); return; }
+  const fresh = pointedAt !== null;
+  if (!pointer || (!fresh && at - sentAt < 250)) return;
+  pending.set(++aimed, fresh ? pointedAt : at);
+  predicted.push([aimed, ownPaddle ? ownPaddle.x : 0, ownPaddle ? ownPaddle.y : 0]);
+  if (predicted.length > 90) predicted.shift();
+  if (pending.size > 240) pending.delete(pending.keys().next().value);
+  pointedAt = null;
+  sentAt = at;
+  const limit = (v) => Math.max(-10, Math.min(10, v));
+  send("aim", { x: limit(pointer[0]), y: limit(pointer[1]), q: aimed, rtt: roundTrip || 0 });
+}
+
+let stickUsed = 0;
+const pressed = new Set(); // arrow keys
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+function stick() {
+  const pad = (navigator.getGamepads ? [...navigator.getGamepads()] : []).find(Boolean);
+  let x = pad ? pad.axes[0] || 0 : 0, y = pad ? -(pad.axes[1] || 0) : 0;
+  for (const code of pressed) { x += ARROWS[code][0]; y += ARROWS[code][1]; }
+  if (Math.hypot(x, y) > 0.12) stickUsed = performance.now();
+  if (!stickUsed || performance.now() - stickUsed > 2000) return null;
+  // Right on the stick is right on the screen, whatever seat it is.
+  const a = toTableFrame(x, y);
+  return [Math.max(-1, Math.min(1, a[0])), Math.max(-1, Math.min(1, a[1]))];
+}
+addEventListener("keyup", (event) => pressed.delete(event.code));
+addEventListener("blur", () => pressed.clear());
+
+// Raw updates come at once; others wait for the next picture.
+canvas.addEventListener("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", aim);
+canvas.addEventListener("pointerdown", (event) => { aim(event); canvas.focus(); });
+function toggle() {
+  if (recording) { if (!recording.runs && recording.at >= recording.steps.length - 1) recording.at = 0; recording.runs = !recording.runs; return; }
+  send(now && (now.phase === "play" || now.phase === "countdown") ? "pause" : "start");
+}
+addEventListener("keydown", (event) => {
+  if (["SELECT", "INPUT"].includes(event.target.tagName) || event.repeat) return;
+  if (event.code in ARROWS) { event.preventDefault(); pressed.add(event.code); }
+  if (event.code === "Space" || event.code === "Enter") { if (event.target.tagName === "BUTTON") return; event.preventDefault(); toggle(); }
+  if (event.code === "KeyS" && match && !match.study) send("swap");
+  if (event.code === "KeyM") $("sound").click();
+});
+$("go").onclick = () => send("start");
+$("pause").onclick = toggle;
+$("swap").onclick = () => send("swap");
+$("stop").onclick = () => send("stop");
+// What was clicked must not keep the keyboard: Space starts and pauses.
+addEventListener("click", (event) => { const button = event.target.closest("button"); if (button) button.blur(); });
+$("speed").onchange = () => $("speed").blur();
+$("leave").onclick = () => send("leave");
+$("withdraw").onclick = () => { leaving = true; };
+$("handicap").onchange = () => { send("handicap", { name: $("handicap").value }); $("handicap").blur(); };
+
+let audio = null;
+$("sound").onclick = () => {
+  const on = $("sound").getAttribute("aria-pressed") !== "true";
+  $("sound").setAttribute("aria-pressed", on);
+  audio = on ? new AudioContext() : null;
+};
+function beep(pitch, seconds) {
+  if (!audio) return;
+  const tone = audio.createOscillator(), gain = audio.createGain();
+  tone.frequency.value = pitch; tone.type = "triangle";
+  gain.gain.setValueAtTime(0.12, audio.currentTime);
+  gain.gain.exponentialRampToValueAtTime(0.001, audio.currentTime + seconds);
+  tone.connect(gain).connect(audio.destination); tone.start(); tone.stop(audio.currentTime + seconds);
+}

@@ -1,0 +1,117 @@
+"use strict";
+// Text and controls around the table.
+
+const put = (node, text) => { if (node.textContent !== text) node.textContent = text; };
+function show(headline, detail, go, bare = false) {
+  $("notice").hidden = false; $("notice").classList.toggle("bare", bare);
+  put($("headline"), headline); put($("detail"), detail); $("go").hidden = !go; put($("go"), go);
+}
+
+function updateWords() {
+  put($("name"), match.scenario.replaceAll("_", " "));
+  scoreboard();
+  put($("clock"), `${Math.max(0, match.seconds - now.time).toFixed(0)} s`);
+  put($("trip"), roundTrip === null ? "" : `round trip ${roundTrip.toFixed(0)} ms`);
+  put($("rate"), `loop ${now.rate.toFixed(1)} Hz`);
+  put($("watching"), now.watching ? `${now.watching} watching` : "");
+  $("recording").hidden = !now.recording;
+  if (recording) { updateReplayWords(); return; }
+  if (match.study) { updateStudyWords(); return; }
+  const runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
+  const free = now.seats.findIndex((s) => s.driver === "person" && !s.taken);
+  const mayControl = (sits || now.seats.every((s) => s.driver !== "person")) && free < 0;
+  put($("pause"), runs ? "Pause" : "Start"); $("pause").disabled = !mayControl;
+  $("swap").hidden = now.seats.length < 2; $("swap").disabled = runs || now.phase === "pause" || !mayControl;
+  $("leave").hidden = !sits;
+  canvas.classList.toggle("mine", sits && now.phase === "play");
+  seats(free);
+  handicap(mayControl && !runs && now.phase !== "pause");
+  notice(sits, free, mayControl);
+}
+
+function updateReplayWords() {
+  const over = now.phase === "done", ended = recording.end.reason;
+  put($("pause"), recording.runs ? "Pause" : "Play");
+  seats(-1);
+  if (over) show(verdict(), ended === "played to the end" ? "" : ended, "");
+  else if (flash > 0.3) show("Goal!", "", "", true);
+  else $("notice").hidden = true;
+}
+
+function notice(sits, free, mayControl) {
+  $("stop").hidden = Boolean(match.study) || now.phase !== "pause" || !mayControl;
+  if (down) show("No connection", refused || "trying again…", "");
+  else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), "", "", true);
+  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${match.what} Move the pointer to move your paddle. Space starts.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
+  else if (now.phase === "pause") show("Paused", now.reason, mayControl ? "Go on" : "");
+  else if (now.phase === "done") show(verdict(), now.reason, mayControl ? "Again" : "");
+  else if (flash > 0.3) show("Goal!", "", "", true);
+  else $("notice").hidden = true;
+}
+
+function verdict() {
+  if (now.reason || (recording && recording.end.reason !== "played to the end")) return "Broken off";
+  const teams = new Set(match.seats.map((s) => s.team)), won = new Set(now.success.map((i) => match.seats[i].team));
+  if (teams.size === 1) return won.size ? "Done!" : "Not this time";
+  if (won.size !== 1) return "A draw";
+  if (now.seat !== null) return won.has(match.seats[now.seat].team) ? "You win!" : "You lose";
+  return `${titleOf(now.success[0])} wins`;
+}
+
+let scored = "";
+function scoreboard() {
+  const text = now.caption || `return ${now.returns[0].toFixed(1)}`;
+  if (text === scored) return;
+  scored = text;
+  const found = text.match(/^(\D*?)\s*(-?[\d.]+(?: : -?[\d.]+)*)$/), box = $("score");
+  box.textContent = "";
+  if (!found) { box.textContent = text; return; }
+  const add = (cls, words, ink) => { const s = document.createElement("span"); s.className = cls; s.textContent = words; if (ink) s.style.color = ink; box.append(s); };
+  add("word", found[1]);
+  found[2].split(" : ").forEach((value, i, all) => {
+    if (i) add("colon", ":");
+    add("value", value, all.length > 1 ? SEAT[i % SEAT.length] : "");
+  });
+}
+
+function titleOf(i) {
+  const { driver, title } = now.seats[i];
+  if (title !== undefined) return i === now.seat ? "You" : title;
+  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : driver.replace("zoo/", "policy ").replace(":strength=", ", ");
+}
+
+let panel = "";
+function seats(free) {
+  const can = !recording && (now.phase === "lobby" || now.phase === "done");
+  const state = JSON.stringify([now.seats, now.seat, can, free]);
+  if (state === panel) return;
+  if (document.activeElement && document.activeElement.closest && document.activeElement.closest("#seats")) return; // being chosen
+  panel = state;
+  $("seats").textContent = "";
+  now.seats.forEach((seat, i) => {
+    const box = document.createElement("span"), dot = document.createElement("span");
+    box.className = "seat" + (i === now.seat ? " me" : ""); dot.className = "dot"; dot.style.background = colour(i); box.append(dot);
+    if (i === now.seat || (seat.driver === "person" && seat.taken)) box.append(titleOf(i));
+    else if (now.seat !== null && can && !match.study) {
+      const list = document.createElement("select");
+      list.setAttribute("aria-label", `who plays seat ${i + 1}`);
+      for (const name of [...new Set(["person", seat.driver, ...match.choices])]) {
+        const option = new Option(name === "person" ? "another person" : name.replace("zoo/", "policy ").replace(":strength=", ", "), name);
+        option.selected = name === seat.driver; list.append(option);
+      }
+      list.onchange = () => { send("opponent", { seat: i, name: list.value }); list.blur(); panel = ""; };
+      box.append(list);
+    } else if (seat.driver === "person" && !match.study) {
+      const sit = document.createElement("button"); sit.textContent = "Take this seat"; sit.onclick = () => send("sit", { seat: i }); box.append(sit);
+    } else box.append(titleOf(i));
+    $("seats").append(box);
+  });
+}
+
+function handicap(canChoose) {
+  const list = $("handicap"), names = [...new Set([...match.handicaps, now.handicap])];
+  list.hidden = now.seats.every((s) => s.driver === "person");
+  list.disabled = !canChoose;
+  if (list.options.length !== names.length) { list.textContent = ""; for (const name of names) list.append(new Option(name)); }
+  if (document.activeElement !== list) list.value = now.handicap;
+}

@@ -1,0 +1,45 @@
+"""Contents of the messages that pages get in a study, JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from marl_airhockey.play.match_drivers import PERSON
+from marl_airhockey.study.course import Course
+from marl_airhockey.study.plan import Plan
+
+
+def texts(plan: Plan) -> dict[str, Any]:
+    """Return the texts and questions of a plan."""
+    return {
+        "title": plan.title,
+        "version": plan.version,
+        "information": plan.information.strip().split("\n\n"),
+        "agree": plan.agree,
+        "thanks": plan.thanks,
+        "blocks": plan.blocks,
+        "questions": [{**vars(q), "largest": q.largest} for q in plan.questions],
+    }
+
+
+def seat_rows(course: Course | None, seats: int) -> list[dict[str, Any]]:
+    """Return a row for each seat, with no more of the opponent than the plan allows."""
+    title = course.title if course else ""
+    other = {"driver": title, "taken": True, "title": title}
+    return [{"driver": PERSON, "taken": course is not None}] + [other] * (seats - 1)
+
+
+def progress(course: Course, waits: bool) -> dict[str, Any]:
+    """Return a participant's position in the plan.
+
+    Args:
+        course: of the participant.
+        waits: True if a person is missing at another seat.
+    """
+    return {
+        "block": course.block,
+        "game": course.game,
+        "games": course.games,
+        "time_left": round(course.time_left),
+        "waits": waits,
+    }

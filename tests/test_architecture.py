@@ -1,0 +1,81 @@
+"""Rules of the house that no linter knows; `lint-imports` keeps the layers."""
+
+import ast
+import re
+import subprocess
+import sys
+import tokenize
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
+LEAVES = [PACKAGE.parent / folder for folder in ("scenarios", "agents")]
+SOURCES = [path for folder in (PACKAGE, *LEAVES) for path in folder.rglob("*.py")]
+LOWER_ROOMS = ("types", "jit", "core", "contracts", "toolkit")
+EXTRAS = [
+    "torch",
+    "stable_baselines3",
+    "cv2",
+    "pymunk",
+    "gymnasium",
+    "pettingzoo",
+    "PIL",
+    "typer",
+    "rich",
+    "pygame",
+    "matplotlib",
+    "onnxruntime",
+    "mujoco",
+    "robosuite",
+]
+PRIVATE_WORDS = {"told", "shut", "turn", "turns", "turned", "court", "ledger", "chain"}
+
+
+def modules(path):
+    """Modules of this package that a file imports, inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            yield node.module or ""
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+
+
+def test_scenarios_and_agents_import_the_toolkit_alone():
+    for path in (path for folder in LEAVES for path in folder.glob("*.py")):
+        for module in modules(path):
+            if module.startswith("marl_airhockey"):
+                assert module.startswith("marl_airhockey.toolkit"), f"{path}: {module}"
+
+
+@pytest.mark.parametrize("room", LOWER_ROOMS)
+def test_lower_rooms_import_with_extras_blocked(room):
+    found = sorted((PACKAGE / room).rglob("*.py")) or [PACKAGE / f"{room}.py"]
+    names = [
+        ".".join(path.relative_to(PACKAGE).with_suffix("").parts) for path in found
+    ]
+    program = (
+        "import importlib, sys, types\n"
+        f"for name in {EXTRAS!r}: sys.modules[name] = None\n"
+        "package = types.ModuleType('marl_airhockey')\n"
+        f"package.__path__ = [{str(PACKAGE)!r}]\n"
+        "sys.modules['marl_airhockey'] = package\n"
+        f"for name in {names!r}: importlib.import_module(f'marl_airhockey.{{name}}')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True)
+    assert done.returncode == 0, done.stderr.decode()
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
+def test_nothing_uses_a_global_random_generator(path):
+    text = path.read_text()
+    for word in ("np.random.seed", "np.random.rand", "import random\n"):
+        assert word not in text
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
+def test_names_are_the_fields_words(path):
+    with path.open("rb") as file:
+        tokens = [t.string for t in tokenize.tokenize(file.readline) if t.type == 1]
+    words = {word for name in tokens for word in re.split("_+", name.lower())}
+    assert not words & PRIVATE_WORDS

@@ -1,0 +1,132 @@
+"""The page of a match or a study, in headless Chromium."""
+
+import time
+
+from pages import page_at, running, served, state_of, wait
+from study_steps import plan_writer
+
+from marl_airhockey.play.live_match import RATE, LiveMatch
+from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.session import Session
+
+
+def test_a_person_plays_in_the_browser(browser):
+    complaints = []
+    with served("duel", "--opponent", "still", "--option", "goals_to_win=1") as (at, _):
+        page = page_at(browser, at, complaints)
+        watcher = page_at(browser, at, complaints, color_scheme="dark")
+        assert state_of(page)["seat"] == 0
+        assert state_of(watcher)["seat"] is None
+        page.keyboard.press("Space")
+        wait(page, "s.phase === 'play'")
+        box = page.locator("#table").bounding_box()
+        metre = box["width"] / 1.82
+        middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+        def point(x, y):
+            page.mouse.move(middle[0] + x * metre, middle[1] - y * metre)
+
+        point(-0.5, 0.15)
+        wait(page, "Math.hypot(s.paddles[0][0] + 0.5, s.paddles[0][1] - 0.15) < 0.03")
+        began = time.monotonic()
+        while (state := state_of(page))["phase"] == "play":
+            # Get behind the puck, then through it.
+            x, y = state["pucks"][0][:2]
+            behind = state["paddles"][0][0] < x - 0.06
+            point(min(x, -0.06) if behind else x - 0.2, y)
+            page.wait_for_timeout(16)
+            assert time.monotonic() - began < 55, "no goal against nobody"
+        wait(page, "s.phase === 'done'")
+        assert state["caption"].startswith("goals")
+        assert page.locator("#headline").inner_text() in ("You win!", "You lose")
+        assert state_of(watcher)["phase"] == "done"
+        page.locator("#go").click()
+        wait(page, "s.phase === 'play' && s.n < 60")
+        page.reload()
+        page.wait_for_function("window.airhockey.frames.length > 5")
+        wait(page, "s.seat === 0 && s.phase === 'play'")
+        page.close()
+        wait(watcher, "s.phase === 'pause'")
+        watcher.close()
+    assert not complaints
+
+
+def test_a_phone_plays_upright(browser):
+    complaints = []
+    with served("juggle") as (address, _):
+        page = page_at(browser, address, complaints, color_scheme="dark")
+        page.set_viewport_size({"width": 390, "height": 760})
+        page.locator("#go").click()
+        wait(page, "s.phase === 'play'")
+        box = page.locator("#table").bounding_box()
+        x, y = box["x"] + box["width"] * 0.5, box["y"] + box["height"] * 0.8
+        page.mouse.move(x, y)
+        wait(page, "Math.abs(s.paddles[0][1]) < 0.03 && s.ack > 0")
+        page.close()
+    assert not complaints
+
+
+def test_a_recording_is_watched_in_the_page(browser, tmp_path):
+    match = LiveMatch("duel", {"paddle_0": "striker", "paddle_1": "still"}, {}, seed=1)
+    session = Session(match, Recorder(tmp_path))
+    match.start()
+    for _ in range(8 * RATE):
+        session.tick()
+    session.recorder.end(match, "enough")
+    (path,) = tmp_path.iterdir()
+    complaints = []
+    with running("watch", str(path)) as (address, _):
+        page = page_at(browser, address, complaints)
+        wait(page, "s.n > 30")
+        page.locator("#pause").click()
+        page.locator("#scrub").fill("200")
+        wait(page, "s.n === 200")
+        page.locator("#speed").select_option("4")
+        page.locator("#pause").click()
+        wait(page, "s.n > 260")
+        page.get_by_text("Broken off").wait_for()
+        page.locator("#scrub").fill("0")
+        wait(page, "s.n === 0")
+        page.locator("#scrub").fill(page.locator("#scrub").get_attribute("max"))
+        page.get_by_text("Broken off").wait_for()
+        page.get_by_text("enough").wait_for()
+        page.close()
+    assert not complaints
+
+
+def test_a_participant_in_the_browser(browser, tmp_path):
+    plan_writer(tmp_path)()
+    complaints = []
+    words = ("study", "run", str(tmp_path / "plan.toml"), "--out", str(tmp_path / "o"))
+    with running(*words, "--port", "0", "--no-browser") as (address, _):
+        page = page_at(browser, address, complaints)
+        go = page.get_by_role("button", name="Take part")
+        assert go.is_disabled()
+        page.get_by_role("checkbox").check()
+        go.click()
+        for _ in range(2):
+            wait(page, "s.study.stage === 'ready'")
+            page.locator("#go").click()
+            wait(page, "s.phase === 'play'")
+            page.keyboard.down("ArrowUp")
+            wait(page, "s.paddles[0][1] > 0.1 || s.phase === 'done'")
+            page.keyboard.up("ArrowUp")
+        wait(page, "s.study.stage === 'questions'")
+        page.get_by_label("a program").check()
+        page.reload()
+        page.get_by_label("a program").check()
+        go = page.get_by_role("button", name="Go on")
+        assert go.is_disabled()
+        page.get_by_label("6", exact=True).check()
+        go.click()
+        wait(page, "s.study.stage === 'ready' && s.study.block === 1")
+        page.get_by_role("button", name="Withdraw").click()
+        page.get_by_role("button", name="Stay").click()
+        page.get_by_role("button", name="Withdraw").click()
+        page.get_by_role("button", name="Erase everything").click()
+        wait(page, "s.study.stage === 'erased'")
+        page.get_by_role("button", name="Next participant").click()
+        page.get_by_role("button", name="Take part").wait_for()
+        page.close()
+    assert not complaints
+    assert [p.name for p in (tmp_path / "o").rglob("*.jsonl")] == ["erased.jsonl"]

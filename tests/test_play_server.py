@@ -1,0 +1,200 @@
+"""The server of a match: messages, bad clients, access, a kill."""
+
+import asyncio
+import json
+import re
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+
+import pytest
+import websockets
+from pages import aim, line, served
+
+from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.play.live_match import RATE
+from marl_airhockey.play.protocol import BURST, LARGEST, RateLimiter, parse
+from marl_airhockey.play.server import listen as listen_at
+
+BAD = [
+    "",
+    "hello",
+    "{",
+    "[]",
+    "1",
+    "null",
+    '"aim"',
+    "{}",
+    '{"t":"fly"}',
+    '{"t":["aim"]}',
+    '{"t":"aim"}',
+    '{"t":"aim","x":0,"y":0,"q":1}',
+    '{"t":"aim","x":0,"y":0,"q":1,"rtt":0,"z":1}',
+    '{"t":"aim","x":NaN,"y":0,"q":1,"rtt":0}',
+    '{"t":"aim","x":Infinity,"y":0,"q":1,"rtt":0}',
+    '{"t":"aim","x":1e300,"y":0,"q":1,"rtt":0}',
+    '{"t":"aim","x":"0","y":0,"q":1,"rtt":0}',
+    '{"t":"aim","x":true,"y":0,"q":1,"rtt":0}',
+    '{"t":"aim","x":0,"y":0,"q":-1,"rtt":0}',
+    '{"t":"sit","seat":0.5}',
+    '{"t":"hello","key":""}',
+    '{"t":"hello","key":"' + "x" * 81 + '"}',
+    "[" * 900,
+    '{"t":"start","x":"' + "y" * LARGEST + '"}',
+]
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_message_is_named(text):
+    with pytest.raises(ValueError, match=r"\w"):
+        parse(text)
+
+
+def test_chatter_is_cut_short():
+    limiter = RateLimiter(0.0)
+    for _ in range(int(BURST)):
+        limiter.acquire(0.0)
+    with pytest.raises(ValueError, match="messages a second"):
+        limiter.acquire(0.0)
+    limiter.acquire(1.0)
+
+
+def socket_of(address):
+    return address.replace("http", "ws").replace("/?", "/ws?").rstrip("/") + (
+        "" if "?" in address else "/ws"
+    )
+
+
+async def newest(socket, wanted="state"):
+    while True:
+        data = json.loads(await asyncio.wait_for(socket.recv(), 5))
+        if data["t"] == wanted:
+            return data
+
+
+async def listen(socket):
+    while True:
+        await asyncio.wait_for(socket.recv(), 5)
+
+
+async def chatter(socket):
+    for q in range(5000):
+        await socket.send(aim(0, 0, q))
+    await listen(socket)
+
+
+def test_frames_are_not_held_back_for_acknowledgements():
+    async def option_of_a_connection():
+        loop, server_socket = asyncio.get_running_loop(), listen_at("127.0.0.1", 0)
+        taken = loop.create_future()
+
+        class Taker(asyncio.Protocol):
+            def connection_made(self, transport):
+                taken.set_result(transport)
+
+        server = await loop.create_server(Taker, sock=server_socket)
+        with socket.create_connection(server_socket.getsockname()):
+            transport = await taken
+            accepted = transport.get_extra_info("socket")
+            found = accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+            transport.abort()
+        server.close()
+        await server.wait_closed()
+        return found
+
+    assert asyncio.run(option_of_a_connection())
+
+
+def test_bad_clients_do_not_disturb_a_game():
+    async def mischief(url):
+        async with websockets.connect(url) as player:
+            await player.send(line("hello", key="player"))
+            await player.send(line("start"))
+            while (await newest(player))["n"] < 3:
+                pass
+            watcher = await websockets.connect(url)  # that never reads
+            for i in range(200):
+                bad = await websockets.connect(url)
+                text = BAD[i % len(BAD)] if i % 21 else b"\x00\xff"
+                if i % 23 == 0:
+                    text = "x" * 100_000
+                await bad.send(text)
+                with pytest.raises(websockets.ConnectionClosed):
+                    await listen(bad)
+            noisy = await websockets.connect(url)
+            with pytest.raises(websockets.ConnectionClosed):
+                await chatter(noisy)
+            for _ in range(50):
+                dropped = await websockets.connect(url)
+                dropped.transport.abort()
+            before = await newest(player)
+            await player.send(aim(-0.3, 0.1, 9))
+            while (state := await newest(player))["ack"] != 9:
+                pass
+            assert state["n"] > before["n"]
+            assert state["phase"] == "play"
+            watcher.transport.abort()
+
+    with served("duel", "--opponent", "still", "--option", "seconds=600") as (at, _):
+        asyncio.run(mischief(socket_of(at)))
+
+
+def test_strangers_are_kept_out():
+    with served("duel", "--opponent", "still") as (address, _):
+        for headers in ({"Host": "evil.example"}, {"Origin": "http://evil.example"}):
+            request = urllib.request.Request(address, headers=headers)
+            with pytest.raises(urllib.error.HTTPError, match="403"):
+                urllib.request.urlopen(request)
+
+        async def cross_site():
+            with pytest.raises(websockets.InvalidStatus, match="403"):
+                await websockets.connect(
+                    socket_of(address), origin="http://evil.example"
+                )
+
+        asyncio.run(cross_site())
+    with served("duel", "--opponent", "still", "--host", "0.0.0.0") as (address, _):
+        assert "token=" in address
+        near = re.sub(r"//[^:]+", "//127.0.0.1", address)
+        assert b"canvas" in urllib.request.urlopen(near).read()
+        for link in (near.partition("?")[0], near[:-3] + "abc"):
+            with pytest.raises(urllib.error.HTTPError, match="403"):
+                urllib.request.urlopen(link)
+
+
+def test_a_killed_server_loses_no_second_of_a_recording(tmp_path):
+    async def play(url):
+        async with websockets.connect(url) as player:
+            await player.send(line("hello", key="player"))
+            await player.send(line("start"))
+            while (state := await newest(player))["n"] < 90:
+                pass
+            return state["n"]
+
+    with served("duel", "--opponent", "still", "--record", str(tmp_path)) as (at, it):
+        shown = asyncio.run(play(socket_of(at)))
+        it.kill()
+        it.wait(10)
+    (path,) = tmp_path.iterdir()
+    _, steps, end = read(path)
+    assert end == {}
+    assert steps[-1]["n"] >= shown - RATE
+
+
+def test_a_taken_port_is_named():
+    with served("duel", "--opponent", "still") as (address, _):
+        port = re.search(r":(\d+)/", address)[1]
+        command = [sys.executable, "-m", "marl_airhockey.cli", "play", "duel"]
+        done = subprocess.run(
+            [*command, "--port", port], capture_output=True, text=True, check=False
+        )
+    assert done.returncode == 1
+    assert f"--port {port}" in done.stderr
+    for bad in (["--port", "99999"], ["--reaction", "900"], ["--opponent", "policy"]):
+        done = subprocess.run(
+            [*command, *bad], capture_output=True, text=True, check=False
+        )
+        assert done.returncode in (1, 2)
+        assert "Traceback" not in done.stderr

@@ -1,0 +1,140 @@
+"""Recordings of play: what is written, refused, filmed and summed up."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+from pages import aim, line
+from PIL import Image
+
+from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.play.live_match import RATE, LiveMatch
+from marl_airhockey.play.measures import interceptions, reactions
+from marl_airhockey.play.plots import plot_report
+from marl_airhockey.play.protocol import RateLimiter
+from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.report import summarize
+from marl_airhockey.play.session import Session
+from marl_airhockey.play.video import write_recording_video
+
+
+def test_an_episode_is_recorded_step_by_step(tmp_path):
+    options = {"options": {"seconds": 2.0}, "backend": "numba"}
+    match = LiveMatch("duel", {"paddle_1": "striker"}, options, seed=5)
+    session = Session(match, Recorder(tmp_path))
+    client = session.connect()
+    session.receive(client, line("hello", key="k"))
+    session.receive(client, aim(-0.3, 0.1))
+    session.receive(client, line("start"))
+    while match.phase != "done":
+        session.tick()
+    (path,) = tmp_path.iterdir()
+    meta, steps, end = read(path)
+    assert meta["players"][0] == {
+        "seat": 0,
+        "driver": "person",
+        "person": client.name,
+        "consent": None,
+    }
+    assert meta["physics"]["tilt"] == 0.0
+    assert len(steps) == 2 * RATE == end["steps"]
+    assert steps[-1]["n"] == 2 * RATE
+    assert set(steps[0]) >= {"action", "command", "terms", "clock", "delays", "paddles"}
+    np.testing.assert_allclose(
+        steps[-1]["paddles"], match.world.state.paddle[0], atol=1e-4
+    )
+    write_recording_video(path, tmp_path / "game.gif")
+    with Image.open(tmp_path / "game.gif") as video:
+        assert video.n_frames == RATE
+    rows = path.read_text().splitlines()
+    path.write_text("\n".join([rows[0], '{"kind":"step","n":1}']))
+    with pytest.raises(ValueError, match="line 2 lacks"):
+        read(path)
+    path.write_text(rows[0].replace('"format":2', '"format":1'))
+    with pytest.raises(ValueError, match=f"{path.name}: recorded by an older version"):
+        read(path)
+    path.write_text(rows[0])
+    with pytest.raises(ValueError, match="no steps"):
+        write_recording_video(path, tmp_path / "game.gif")
+    path.write_bytes(b"\xff\x00")
+    with pytest.raises(ValueError, match="cannot be read"):
+        read(path)
+    path.write_text("nothing")
+    with pytest.raises(ValueError, match="no recording"):
+        read(path)
+
+
+def test_recordings_become_a_report(tmp_path):
+    for seed in range(3):
+        seats = {"paddle_0": "person", "paddle_1": "striker:strength=fair"}
+        options = {"options": {"seconds": 6.0}}
+        match = LiveMatch("duel", seats, options, seed=seed)
+        session = Session(match, Recorder(tmp_path))
+        client = session.connect()
+        session.receive(client, line("hello", key="alice"))
+        session.receive(client, line("start"))
+        while match.phase != "done":
+            _, y = match.world.state.puck[0, 0]
+            client.limiter = RateLimiter(time.monotonic())
+            session.receive(client, aim(-0.6, float(y)))
+            session.tick()
+    match.start()
+    for _ in range(4 * RATE):
+        session.tick()
+    session.recorder.end(match, "a player has left")
+    found = summarize(tmp_path)
+    assert found.episodes == 4
+    assert found.broken_off == 1
+    person = found.players[client.name]
+    assert person.person
+    assert person.games == 3 == found.players["striker:strength=fair"].games
+    assert len(found.games) == 3
+    assert person.steps > 3 * 6 * RATE
+    assert found.players["striker:strength=fair"].shot_speeds
+    files = found.save(tmp_path / "out")
+    files.append(tmp_path / "out" / "report.png")
+    plot_report(found, files[-1])
+    assert all(path.stat().st_size > 100 for path in files)
+    data = json.loads(files[0].read_text())
+    assert {row["player"] for row in data["players"]} == set(found.players)
+    with pytest.raises(ValueError, match="no recordings"):
+        summarize(tmp_path / "out")
+
+
+def test_reactions_and_interceptions_are_measured_right():
+    n, dt = 120, 1 / RATE
+    place = np.zeros((n, 2))
+    place[:20] = (0.8, 0.0)
+    place[20:, 0] = -0.5 * dt * np.arange(n - 20)
+    motion = np.zeros((n, 2))
+    motion[20:, 0] = -0.5
+    speed = np.zeros(n)
+    speed[20 + 15 :] = 0.5
+    assert list(reactions(place, motion, speed, dt)) == [pytest.approx(0.25)]
+    speed[:] = 0.5
+    assert list(reactions(place, motion, speed, dt)) == [], "who moves does not react"
+    hits = np.zeros(n, bool)
+    hits[90] = True
+    motion[90:, 0] = 1.0
+    assert list(interceptions(place, motion, hits)) == [True]
+    assert list(interceptions(place, motion, hits & False)) == [False]
+
+
+def test_a_match_whose_players_change_does_not_count(tmp_path):
+    match = LiveMatch("duel", {"paddle_1": "still"}, {}, seed=1)
+    session = Session(match, Recorder(tmp_path))
+    first = session.connect()
+    session.receive(first, line("hello", key="a"))
+    session.receive(first, line("start"))
+    for _ in range(5 * RATE):
+        session.tick()
+    session.receive(first, line("leave"))
+    second = session.connect()
+    session.receive(second, line("hello", key="b"))
+    session.receive(second, line("start"))
+    for _ in range(5 * RATE):
+        session.tick()
+    (path,) = tmp_path.iterdir()
+    _, _, end = read(path)
+    assert end["reason"] == "the players changed"
