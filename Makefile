@@ -45,10 +45,11 @@ $(FAR)/.ready: pyproject.toml constraints.txt
 test-distributed: $(FAR)/.ready ## Run the tests of RLlib, in an environment of their own
 	$(FAR)/bin/pytest -W ignore tests/test_distributed.py
 
-lint: setup ## Check format, style, spelling and types
+lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios agents scripts tests
+	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy
 
 docs: setup ## Build the documentation into site/

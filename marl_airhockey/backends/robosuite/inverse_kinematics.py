@@ -49,13 +49,7 @@ def reach_for(
         mujoco.mj_comPos(model, data)
         mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
         r = rotation @ data.site_xmat[site].reshape(3, 3).T
-        off = 0.5 * np.array(
-            [
-                error[2, 1] - error[1, 2],
-                error[0, 2] - error[2, 0],
-                error[1, 0] - error[0, 1],
-            ]
-        )
+        off = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
         error = np.concatenate([target - data.site_xpos[site], off])
         if np.linalg.norm(error) < CLOSE:
             return angles
