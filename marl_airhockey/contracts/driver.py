@@ -51,7 +51,8 @@ class Driver:
     """Driver of one seat in B worlds.
 
     Policies and scripts are pure: what they keep between steps is the memory, arrays
-    with one row a world.
+    with one row a world. Environments are copied and pickled with their drivers; one
+    that owns a device leaves it behind in its ``__getstate__``.
     """
 
     observe: str | None = None

@@ -266,7 +266,8 @@ class GoalScenario(Scenario):
 
     def goal_met(self, state: State, memory: Memory) -> Array:
         reward = self.goal_reward(self.achieved(state, memory), self.desired(memory))
-        return np.asarray(reward > 0)
+        met: Array = reward > 0
+        return met
 
 
 def _jitter(before: State, command: Array, top_speed: Array | float) -> Array:

@@ -158,7 +158,7 @@ def _limit(
                 share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
                 sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
             held = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2) if count else 0.0
-            if np.isfinite(prescribed[b, s, 2]) and np.isfinite(prescribed[b, s, 3]):
+            if not np.isnan(prescribed[b, s, 0]):
                 sx, sy = prescribed[b, s, 2], prescribed[b, s, 3]
             command[b, s, 0], command[b, s, 1] = sx, sy
             acceleration[b, s, 0] = (sx - vx) * rate

@@ -121,7 +121,7 @@ class Scene:
             touched=np.zeros(pairs, np.int64),
             touched_at=np.full(pairs, np.nan),
             touching=np.zeros(pairs, np.bool_),
-            banked=np.zeros((*pucks, sides), np.int64),
+            banked=np.zeros((*pucks, sides), np.int16),
             crossed=np.zeros((*pucks, lines), np.bool_),
             crossed_velocity=np.zeros((*pucks, lines, 2)),
             visible=np.ones(pucks, np.bool_),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.contracts.scenario import Scenario, Transition
+from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.registry import (
     agent_names,
     backend_names,
@@ -51,10 +53,7 @@ def summary() -> dict[str, Any]:
 def describe(name: str) -> dict[str, Any]:
     """Seats, observation, reward terms and options of a scenario."""
     scenario = make_scenario(name)
-    world = build_world(name, 1, autoreset=True, keywords={})
-    world.reset(0)
-    step = world.step(np.zeros((1, len(world.open), 2)))
-    layout = world.observer.layout
+    layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
     doc = (type(scenario).__doc__ or "").strip()
     return {
         "name": name,
@@ -76,9 +75,22 @@ def describe(name: str) -> dict[str, Any]:
                 layout.labels, layout.low, layout.high, strict=True
             )
         ],
-        "reward": [{"term": term} for term in step.terms],
+        "reward": [{"term": term} for term in reward_terms(scenario)],
         "options": [
             {"option": f.name, "default": getattr(scenario, f.name)}
             for f in dataclasses.fields(scenario)
         ],
     }
+
+
+def reward_terms(scenario: Scenario) -> list[str]:
+    """Return the names of all reward terms of a scenario, without compiling it."""
+    first = np.zeros(1, np.int64)
+    state, memory = scenario.reset(RandomStreams.keyed(first, first, "start"), 1)
+    if scenario.scene.path:
+        moments = np.zeros((1, 2, scenario.scene.bodies.movers, 4))
+        state = replace(state, path=moments)
+    command = np.zeros((1, len(scenario.scene.seats), 2))
+    t = Transition(state, command, state, memory, memory, np.zeros(1, np.bool_))
+    t = t._replace(new_memory=scenario.next_memory(t))
+    return list(scenario.all_reward_terms(t))

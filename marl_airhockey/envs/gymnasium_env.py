@@ -1,4 +1,4 @@
-"""The gymnasium.Env: one open seat, all others driven."""
+"""Gymnasium Env: one open seat, all others driven."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ import gymnasium
 import numpy as np
 
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.core.state import State
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.world import World
 
 
 class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
-    """A scenario as its only open seat sees it.
+    """Scenario as its only open seat sees it.
 
     Args:
         scenario: its name, or a scenario object.
@@ -52,10 +53,18 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode."""
+        """Begin an episode; options as those of `AirHockeyEnv.reset`."""
         super().reset(seed=seed)
         observation, info = self.parallel.reset(seed, options)
         return observation[self.agent], info[self.agent]
+
+    def get_state(self) -> tuple[State, Memory]:
+        """Return the true state and the scenario's memory, which `set_state` takes."""
+        return self.parallel.get_state()
+
+    def set_state(self, state: State, memory: Memory | None = None) -> Any:
+        """Go on from a given state, see `World.set_state`; return the observation."""
+        return self.parallel.set_state(state, memory)[self.agent]
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Move by one control step; see `AirHockeyEnv` for the info."""
@@ -66,7 +75,7 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         return seen[me], reward[me], ended[me], cut[me], info[me]
 
     def render(self) -> Any:
-        """A picture (H, W, 3) uint8 for "rgb_array"."""
+        """Return a picture (H, W, 3) uint8 for "rgb_array"."""
         return self.parallel.render()
 
     def close(self) -> None:
@@ -75,7 +84,7 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
 
 
 class AirHockeyGoalEnv(AirHockeySingleEnv):
-    """The same with goals="dict": a goal environment for hindsight relabelling."""
+    """Goal environment for hindsight relabelling, with goals="dict"."""
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
         """(...) float32: 1 where the goal is met; of goals (..., goal) alone."""
@@ -105,7 +114,7 @@ def make_single(
     camera: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeySingleEnv:
-    """What ``gymnasium.make`` calls."""
+    """Build the environment, as ``gymnasium.make`` asks for it."""
     dicts = keywords.get("goals") == "dict"
     kind = AirHockeyGoalEnv if dicts else AirHockeySingleEnv
     return kind(scenario, render_mode, camera, **keywords)

@@ -1,4 +1,4 @@
-"""The gymnasium VectorEnv over B worlds: no dicts of agents, no copies in between."""
+"""Gymnasium VectorEnv over B worlds: no dicts of agents, no copies in between."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.state import State
 from marl_airhockey.envs.gymnasium_env import check_one_open
+from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.spaces import action_space, observation_space
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.episode import StepResult
 from marl_airhockey.world.observer import Observation
 
 
 class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
-    """B worlds of a scenario with one open seat; worlds restart in the same step.
+    """Worlds of a scenario with one open seat, which restart in the same step.
 
     ``infos`` are dicts of arrays (B, ...). Where an episode ended, ``final_obs`` and
     ``final_info`` hold its end, with the masks ``_final_obs`` and ``_final_info``.
@@ -45,10 +47,23 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode in every world; world i gets seed + i."""
+        """Begin an episode in every world; world i gets seed + i.
+
+        Options as those of `AirHockeyEnv.reset`, with a row for each world.
+        """
         if seed is not None and not isinstance(seed, (int, np.integer)):
             raise ValueError("seed: give one number; world i gets seed + i")
-        return _rows(self.world.reset(seed)), {}
+        return _rows(reset_world(self.world, seed, options)), {}
+
+    def get_state(self) -> tuple[State, Memory]:
+        """Return the true states and the memories of all worlds, (B, ...)."""
+        return self.world.get_state()
+
+    def set_state(
+        self, state: State, memory: Memory | None = None, worlds: Array | None = None
+    ) -> Any:
+        """Go on from given states, see `World.set_state`; return the observations."""
+        return _rows(self.world.set_state(state, memory, worlds))
 
     def step(self, actions: Array) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
         """Move all worlds by one control step; actions (B, 2)."""
@@ -82,7 +97,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
 
 
 def _rows(observation: Observation) -> Any:
-    """The only seat's rows (B, ...) of an observation (B, 1, ...)."""
+    """Return the only seat's rows (B, ...) of an observation (B, 1, ...)."""
     if isinstance(observation, np.ndarray):
         return observation[:, 0]
     return {name: value[:, 0] for name, value in observation.items()}

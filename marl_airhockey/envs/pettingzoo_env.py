@@ -1,4 +1,4 @@
-"""The PettingZoo ParallelEnv: one world, arrays turned into dicts."""
+"""PettingZoo ParallelEnv: one world, with dicts of agents."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from pettingzoo import ParallelEnv
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.limits import VIOLATIONS
+from marl_airhockey.core.state import State
+from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.spaces import (
     action_space,
     global_state,
     observation_space,
     state_space,
 )
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.episode import StepResult
 
@@ -30,16 +32,19 @@ Dicts = tuple[
 
 
 CONSTRAINTS = tuple(enumerate(VIOLATIONS[:-1]))
-"""The limits, and where their excess stands; the last is the cost."""
+"""Limits and their columns of `violation`; the last of all is the cost."""
 
 
 class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
-    """One world of a scenario; the open seats are the agents, ``paddle_0`` and so on.
+    """World of a scenario whose open seats are the agents, ``paddle_0`` and so on.
 
     All agents stay to the end of the episode and end together. ``info`` of an agent
-    holds ``reward`` (terms by name), ``sent`` (what acted, as an action), ``success``
-    (latched), ``constraints`` and ``cost`` (by how much what was asked exceeded the
-    limits); that of a reset holds the ``physics`` of the episode.
+    holds ``reward`` (terms by name), ``applied_action``, ``success`` (latched),
+    ``constraints`` and ``cost`` (excess of the action over the limits); that of a reset
+    holds the ``physics`` of the episode.
+
+    It can be copied and pickled at any moment, and the copy goes on by itself; an open
+    window is left behind.
 
     Args:
         scenario: its name, or a scenario object.
@@ -113,31 +118,61 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         return {name: agents for name, agents in mine.items() if agents}
 
     def observation_space(self, agent: str) -> Any:
-        """The same object at every call."""
+        """Return the same object at every call."""
         return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> Any:
-        """The same object at every call."""
+        """Return the same object at every call."""
         return self._action_spaces[agent]
 
     def observation_labels(self, agent: str) -> tuple[str, ...]:
-        """Name of each element of the (flat part of the) observation."""
+        """Return the name of each element of the (flat part of the) observation."""
         self._observation_spaces[agent]
         return self.world.observer.layout.labels
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Begin an episode; the same seed gives the same episodes."""
+        """Begin an episode; the same seed gives the same episodes.
+
+        Args:
+            seed: of this and the following episodes; None goes on with those there are.
+            options: ``{"state": State, "memory": Memory}`` begins at a given state, see
+                `set_state`; the memory may be left out.
+
+        Raises:
+            ValueError: an unknown option, or a state that does not fit, named.
+        """
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        observation = self.world.reset(seed)
+        observation = reset_world(self.world, seed, options)
         self.agents = self.possible_agents[:]
         physics = {k: float(v[0]) for k, v in self.world.episode.physics.items()}
+        self._begin_pictures()
+        return self._dict(observation), {a: {"physics": physics} for a in self.agents}
+
+    def get_state(self) -> tuple[State, Memory]:
+        """Return the true state and the scenario's memory, which `set_state` takes.
+
+        They have no axis of worlds; freshly allocated.
+        """
+        state, memory = self.world.get_state()
+        return state.map(lambda x: x[0]), {name: x[0] for name, x in memory.items()}
+
+    def set_state(self, state: State, memory: Memory | None = None) -> dict[str, Any]:
+        """Go on from a given state, see `World.set_state`; return the observations.
+
+        All agents play, even if the episode had ended.
+        """
+        observation = self.world.set_state(state, memory)
+        self.agents = self.possible_agents[:]
+        self._begin_pictures()
+        return self._dict(observation)
+
+    def _begin_pictures(self) -> None:
         if self._renderer is not None:
             self._renderer.begin()
         self._watch()
-        return self._dict(observation), {a: {"physics": physics} for a in self.agents}
 
     def step(self, actions: Mapping[str, Any]) -> Dicts:
         """Move by one control step.
@@ -171,7 +206,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             self._renderer.follow()
 
     def _array(self, actions: Mapping[str, Any]) -> Array:
-        """(1, open, 2) from a dict with an action for each agent and no other."""
+        """Return (1, open, 2) from a dict with an action for each agent and no more."""
         agents = self.agents
         if actions.keys() != self._action_spaces.keys():
             missing = sorted(set(agents) - set(actions))
@@ -205,11 +240,11 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         }
 
     def state(self) -> Array:
-        """The true state of everything, table frame, for centralised critics."""
+        """Return the true state of everything, table frame, as flat numbers."""
         return np.asarray(global_state(self.world)[0])
 
     def render(self) -> Array | None:
-        """A picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""
+        """Return a picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""
         if self._renderer is None:
             raise RuntimeError('render: build it with render_mode="rgb_array"')
         return self._renderer.show()

@@ -1,4 +1,4 @@
-"""The stable-baselines3 VecEnv over B worlds: one slot for each open seat of each."""
+"""Stable-baselines3 VecEnv over B worlds: a slot for each open seat of each."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.core.state import State
 from marl_airhockey.envs.spaces import action_space, observation_space
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.episode import StepResult
 from marl_airhockey.world.observer import Observation
 
 
 class AirHockeyVecEnv(VecEnv):
-    """B x open seats as SB3 slots, world by world; episodes restart at once.
+    """Slots of SB3 for B x open seats, world by world; episodes restart at once.
 
     Done slots get ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``,
     ``first_shot`` and ``episode``; all others share one empty dict.
@@ -48,7 +49,7 @@ class AirHockeyVecEnv(VecEnv):
         super().__init__(slots, observation_space(self.world.observer), action_space())
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """World i gets seed + i at the next reset."""
+        """Give world i the seed + i at the next reset."""
         if seed is not None:
             self.world.seed(seed)
         return [seed] * self.num_envs
@@ -57,6 +58,16 @@ class AirHockeyVecEnv(VecEnv):
         """Begin an episode in every world."""
         self._returns[:], self._lengths[:] = 0.0, 0
         return self._slots(self.world.reset())
+
+    def get_state(self) -> tuple[State, Memory]:
+        """Return the true states and the memories of all worlds, (B, ...)."""
+        return self.world.get_state()
+
+    def set_state(
+        self, state: State, memory: Memory | None = None, worlds: Array | None = None
+    ) -> Any:
+        """Go on from given states, see `World.set_state`; return the observations."""
+        return self._slots(self.world.set_state(state, memory, worlds))
 
     def step_async(self, actions: Array) -> None:
         """Take the actions (slots, 2)."""
@@ -108,7 +119,7 @@ class AirHockeyVecEnv(VecEnv):
         return slot // self.seats
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
-        """Some worlds, by index, have begun anew after their last step."""
+        """Note that some worlds, by index, have begun anew after their last step."""
         return None
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
@@ -122,7 +133,7 @@ class AirHockeyVecEnv(VecEnv):
         self.world.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the environment, once for each slot."""
+        """Return an attribute of the environment, once for each slot."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -132,12 +143,12 @@ class AirHockeyVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
     ) -> list[Any]:
-        """Call a method once for each slot asked for."""
+        """Call a method once for each of some slots."""
         method = getattr(self, method_name)
         return [method(*args, **kwargs) for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """No slot is wrapped."""
+        """Tell for each slot that it is not wrapped."""
         return [False for _ in self._get_indices(indices)]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.render.picture import WIDTH, Frame, draw
@@ -46,6 +46,10 @@ class Renderer:
         self.index, self.camera = index, camera
         self._window: Window | None = None
         self.begin()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave an open window behind: a copy opens its own when it shows something."""
+        return {**vars(self), "_window": None}
 
     def begin(self) -> None:
         """Clear the trails at the begin of an episode."""

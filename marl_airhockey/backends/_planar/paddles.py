@@ -34,17 +34,16 @@ def follow(
     """
     for b in range(len(goal)):
         for i in range(goal.shape[1]):
-            whole = True
-            for k in range(4):
-                whole &= bool(np.isfinite(prescribed[b, i, k]))
+            goal[b, i, 0], goal[b, i, 1] = velocity[b, i, 0], velocity[b, i, 1]
+            imposed[b, i] = lifted[b, i] = False
+            if np.isnan(prescribed[b, i, 0]):
+                continue
+            imposed[b, i] = True
             for axis in range(2):
-                goal[b, i, axis] = velocity[b, i, axis]
-                if whole:
-                    distance = prescribed[b, i, axis] - position[b, i, axis]
-                    goal[b, i, axis] = distance / dt
+                distance = prescribed[b, i, axis] - position[b, i, axis]
+                goal[b, i, axis] = distance / dt
             speed = np.hypot(goal[b, i, 0], goal[b, i, 1])
-            imposed[b, i] = whole
-            lifted[b, i] = whole and speed > MAX_PRESCRIBED_SPEED
+            lifted[b, i] = speed > MAX_PRESCRIBED_SPEED
 
 
 @njit(cache=True)

@@ -74,10 +74,6 @@ class Previous(NamedTuple):
     """(B, N, 2) m"""
     velocity: Array
     """(B, N, 2) m/s"""
-    angle: Array
-    """(B, N) rad"""
-    spin: Array
-    """(B, N) rad/s"""
     touching: Array
     """(B, paddles, pucks) see `State`"""
     time: Array
@@ -91,10 +87,6 @@ class Motion(NamedTuple):
     """(B, N, 2) m"""
     velocity: Array
     """(B, N, 2) m/s"""
-    angle: Array
-    """(B, N) rad"""
-    spin: Array
-    """(B, N) rad/s"""
     path: Array
     """(B, substeps + 1, movers, 4) x, y, vx, vy, or (B, 0, movers, 4) if not wanted"""
     push: Array

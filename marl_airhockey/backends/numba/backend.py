@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +13,7 @@ from marl_airhockey.backends.numba.arrays import (
     Static,
     make_coefficients,
 )
+from marl_airhockey.backends.numba.contacts import find_leaning
 from marl_airhockey.backends.numba.kernel import advance
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.core.scene import Scene
@@ -73,27 +75,23 @@ class NumbaBackend(Backend):
         super().reset(state, worlds)
         self._push[worlds] = 0.0
         self._out[worlds] = False
-        self._against[worlds] = self._touching_walls(state.puck[worlds])
+        radius = self.scene.table.puck_radius
+        find_leaning(worlds, state.puck, radius, self._static.lines, self._against)
 
-    def _touching_walls(self, puck: Array) -> Array:
-        """(W, pucks, sides) bool: the puck (W, pucks, 2) touches that side's wall."""
-        lines, radius = self._static.lines, self.scene.table.puck_radius
-        normals, offsets, middles, half = np.split(lines, (2, 3, 5), axis=1)
-        ahead = puck @ normals.T + offsets[:, 0]
-        from_middle = puck[..., None, :] - middles
-        aside = (
-            normals[:, 0] * from_middle[..., 1] - normals[:, 1] * from_middle[..., 0]
-        )
-        return np.asarray((ahead < radius) & (np.abs(aside) >= half[:, 0]))
+    def empty_state(self) -> State:
+        # Discs have no spin here: their angles stay, and states share them.
+        rest = self._rest
+        return replace(super().empty_state(), angle=rest.angle, spin=rest.spin)
 
     def stage(self, command: Command, before: State, after: State) -> Stage:
         static = [Fixed(x) if isinstance(x, np.ndarray) else x for x in self._static]
-        names = ("position", "velocity", "angle", "spin", "touching", "time")
+        given = ("position", "velocity", "touching", "time")
+        filled = [name for name in RESULTS if name not in ("angle", "spin")]
         arguments = (
             *(*static, self._coefficients, *command),
             *(self._goal, self._imposed, self._lifted),
-            *(getattr(before, name) for name in names),
-            *(getattr(after, name) for name in RESULTS),
+            *(getattr(before, name) for name in given),
+            *(getattr(after, name) for name in filled),
             self._pathless if after.path is None else after.path,
             *(self._push, self._against, self._out),
         )

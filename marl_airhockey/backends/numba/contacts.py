@@ -98,3 +98,23 @@ def friction_share(speed: float, loss: float) -> float:
 def cap(speed: float, most: float) -> float:
     """Return the share of a speed that leaves at most ``most``."""
     return most / speed if speed > most else 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def find_leaning(
+    worlds: Array, pucks: Array, radius: float, lines: Array, against: Array
+) -> None:
+    """Find the walls that pucks touch in some worlds.
+
+    Args:
+        worlds: (W,) indices.
+        pucks: (B, pucks, 2) m.
+        radius: of a puck, m.
+        lines: `walls.sides`.
+        against: (B, pucks, sides) bool, filled in these worlds.
+    """
+    for b in worlds:
+        for k in range(pucks.shape[1]):
+            for s in range(len(lines)):
+                x, y = pucks[b, k, 0], pucks[b, k, 1]
+                against[b, k, s] = contact_side(x, y, radius, lines, s)[0] > 0.0

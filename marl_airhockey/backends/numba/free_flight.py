@@ -32,8 +32,6 @@ def carry_over(batch: Batch) -> None:
             for axis in range(2):
                 motion.position[b, i, axis] = previous.position[b, i, axis]
                 motion.velocity[b, i, axis] = previous.velocity[b, i, axis]
-            motion.angle[b, i] = previous.angle[b, i]
-            motion.spin[b, i] = previous.spin[b, i]
         for k in range(pucks):
             for i in range(paddles):
                 events.touched[b, i, k], events.touched_at[b, i, k] = 0, np.nan

@@ -68,14 +68,10 @@ def advance(
     lifted: Array,
     previous_position: Array,
     previous_velocity: Array,
-    previous_angle: Array,
-    previous_spin: Array,
     previous_touching: Array,
     previous_time: Array,
     position: Array,
     velocity: Array,
-    angle: Array,
-    spin: Array,
     time: Array,
     touched: Array,
     touched_at: Array,
@@ -101,10 +97,9 @@ def advance(
     follow(command, prescribed, previous_position, control_dt, goal, imposed, lifted)
     commands = Commands(goal, imposed, lifted, closed)
     previous = Previous(
-        *(previous_position, previous_velocity, previous_angle, previous_spin),
-        *(previous_touching, previous_time),
+        previous_position, previous_velocity, previous_touching, previous_time
     )
-    motion = Motion(position, velocity, angle, spin, path, push, time)
+    motion = Motion(position, velocity, path, push, time)
     events = Events(
         *(touched, touched_at, touching, banked, crossed, crossed_velocity),
         *(against, out),
@@ -136,7 +131,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
     control_dt, n = static[7:]
     lines = shared.copy()
     goal, prescribed, lifted, closed = commands
-    position, velocity, _, _, path, pending, _ = motion
+    position, velocity, path, pending, _ = motion
     touched, touched_at, touching, banked = events[:4]
     crossed, crossed_velocity, against, out = events[4:]
     first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
