@@ -339,3 +339,26 @@ def test_two_blocks_meet_with_the_restitution_of_blocks(backend):
     )
     last = bench.run(0.4)[-1]
     np.testing.assert_allclose(last.block_velocity[0, 0, 0], -0.9, rtol=1e-6)
+
+
+def test_bounces_off_each_side_are_counted(backend):
+    bench = Bench(backend, {"wall_restitution": 1.0}, goal_lines=(GoalLine("far", 2),))
+    bench.reset((-0.75, 0.25), (0.0, 0.0, 1.5, 0.9))
+    banked, crossed = np.zeros(4, int), 0
+    for state in bench.run(4.0):
+        banked += state.banked[0, 0]
+        crossed += int(state.crossed[0, 0, 0])
+    # Without losses: a wall of one axis is met every time its width is crossed.
+    radius, size = TABLE.puck_radius, TABLE.size
+    travels = 4.0 * np.array([1.5, 0.9]) / (size - 2 * radius)
+    met = np.floor(travels + 0.5).astype(int)
+    assert banked[[2, 0]].tolist() == [(met[0] + 1) // 2, met[0] // 2]
+    assert banked[[3, 1]].sum() == met[1]
+    assert crossed == banked[2], "a goal line that is a whole side is crossed by it"
+
+
+def test_a_puck_that_rests_on_a_wall_does_not_bounce(backend):
+    bench = Bench(backend, {"tilt": 5.5, "wall_restitution": 0.5})
+    home = -TABLE.size[0] / 2 + TABLE.puck_radius
+    bench.reset((-0.5, 0.25), (home - 5e-5, 0.0, 0.0, 0.0))
+    assert sum(state.banked.sum() for state in bench.run(1.0)) == 0
