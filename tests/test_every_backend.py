@@ -286,7 +286,7 @@ def test_two_paddles_meet_and_share_their_normal_speed(backend):
         # the other, and what they have across the contact stays theirs.
         assert one @ along == pytest.approx(two @ along, abs=1e-9)
         assert abs(one @ across - two @ across) > 0.05
-    assert met > 2
+    assert met >= 2
 
 
 def test_a_squeezed_puck_slips_away(backend):
@@ -345,12 +345,13 @@ def test_bounces_off_each_side_are_counted(backend):
     bench = Bench(backend, {"wall_restitution": 1.0}, goal_lines=(GoalLine("far", 2),))
     bench.reset((-0.75, 0.25), (0.0, 0.0, 1.5, 0.9))
     banked, crossed = np.zeros(4, int), 0
-    for state in bench.run(4.0):
+    for state in bench.run(3.2):
+        assert not state.touched.any()
         banked += state.banked[0, 0]
         crossed += int(state.crossed[0, 0, 0])
     # Without losses: a wall of one axis is met every time its width is crossed.
     radius, size = TABLE.puck_radius, TABLE.size
-    travels = 4.0 * np.array([1.5, 0.9]) / (size - 2 * radius)
+    travels = 3.2 * np.array([1.5, 0.9]) / (size - 2 * radius)
     met = np.floor(travels + 0.5).astype(int)
     assert banked[[2, 0]].tolist() == [(met[0] + 1) // 2, met[0] // 2]
     assert banked[[3, 1]].sum() == met[1]
