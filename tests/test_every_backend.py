@@ -341,20 +341,21 @@ def test_two_blocks_meet_with_the_restitution_of_blocks(backend):
     np.testing.assert_allclose(last.block_velocity[0, 0, 0], -0.9, rtol=1e-6)
 
 
-def test_bounces_off_each_side_are_counted(backend):
+@pytest.mark.parametrize(("axis", "sides"), [(0, (2, 0)), (1, (3, 1))])
+def test_bounces_off_each_side_are_counted(backend, axis, sides):
     bench = Bench(backend, {"wall_restitution": 1.0}, goal_lines=(GoalLine("far", 2),))
-    bench.reset((-0.75, 0.25), (0.0, 0.0, 1.5, 0.9))
+    velocity = 1.5 * np.eye(2)[axis]
+    bench.reset((-0.75, 0.25), (0.0, 0.0, *velocity))
     banked, crossed = np.zeros(4, int), 0
-    for state in bench.run(3.2):
-        assert not state.touched.any()
+    for state in bench.run(3.9):
         banked += state.banked[0, 0]
         crossed += int(state.crossed[0, 0, 0])
-    # Without losses: a wall of one axis is met every time its width is crossed.
-    radius, size = TABLE.puck_radius, TABLE.size
-    travels = 3.2 * np.array([1.5, 0.9]) / (size - 2 * radius)
-    met = np.floor(travels + 0.5).astype(int)
-    assert banked[[2, 0]].tolist() == [(met[0] + 1) // 2, met[0] // 2]
-    assert banked[[3, 1]].sum() == met[1]
+    # Without losses it meets a wall every time that it has crossed the table.
+    travels = 3.9 * 1.5 / (TABLE.size[axis] - 2 * TABLE.puck_radius)
+    met = int(travels + 0.5)
+    first, second = sides
+    assert (banked[first], banked[second]) == ((met + 1) // 2, met // 2)
+    assert banked.sum() == met
     assert crossed == banked[2], "a goal line that is a whole side is crossed by it"
 
 
