@@ -20,7 +20,7 @@ from marl_airhockey.envs.spaces import (
 )
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
-from marl_airhockey.world.episode import StepResult
+from marl_airhockey.world.step_result import StepResult
 
 Dicts = tuple[
     dict[str, Any],

@@ -14,8 +14,8 @@ from marl_airhockey.core.state import State
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
-from marl_airhockey.world.episode import StepResult
 from marl_airhockey.world.observer import Observation
+from marl_airhockey.world.step_result import StepResult
 
 
 class AirHockeyVecEnv(VecEnv):

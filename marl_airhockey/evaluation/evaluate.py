@@ -15,7 +15,7 @@ from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world, find_scenario
-from marl_airhockey.world.episode import StepResult
+from marl_airhockey.world.step_result import StepResult
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000

@@ -17,8 +17,8 @@ from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import policy_driver
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
-from marl_airhockey.world.episode import StepResult
 from marl_airhockey.world.roster import Roster
+from marl_airhockey.world.step_result import StepResult
 
 SCORE_WEIGHT = 0.05
 """Weight of the latest game in the running score against an opponent"""

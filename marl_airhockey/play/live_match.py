@@ -12,7 +12,7 @@ from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, world_state
 from marl_airhockey.registry import find_backend
 from marl_airhockey.world.build import Keywords, build_world
-from marl_airhockey.world.episode import StepResult
+from marl_airhockey.world.step_result import StepResult
 
 RATE = 60
 """Ticks, and control steps, per second."""

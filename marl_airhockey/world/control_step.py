@@ -25,6 +25,17 @@ class Moment(NamedTuple):
     episode: Episode
     """Counters, those of the verdict among them"""
 
+    def write(self, worlds: Array, rows: State, memory: Memory) -> None:
+        """Copy rows of a state and a memory into some worlds, by index."""
+        self.state.write(worlds, rows)
+        for name, row in memory.items():
+            self.verdict.memory[name][worlds] = row
+
+    def begin(self, worlds: Array) -> None:
+        """Begin to count anew in some worlds, by index, from paddles at rest."""
+        self.episode.begin(worlds)
+        self.limited.acceleration[worlds] = 0.0
+
 
 class ControlStep:
     """One control step of B worlds, from actions to rewards.

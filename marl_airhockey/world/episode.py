@@ -1,39 +1,14 @@
-"""Episode: the counters of running episodes, and the result of a step."""
+"""Episode: the counters of running episodes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array
-from marl_airhockey.world.observer import Observation
-
-
-@dataclass
-class StepResult:
-    """Result of a step of B worlds for its open seats; arrays (B, ...), yours."""
-
-    observation: Observation
-    reward: Array
-    """(B, open)"""
-    terminated: Array
-    """(B,) the episode ended for a reason inside the game"""
-    truncated: Array
-    """(B,) the clock ended it"""
-    terms: dict[str, Array]
-    """Reward terms by name, (B, open) each"""
-    applied_action: Array
-    """(B, open, 2) command as a fraction of top speed, ego frame"""
-    violation: Array
-    """(B, seats, 5) excess of the action over the limits, see `limits.VIOLATIONS`"""
-    cost: Array
-    """(B, open) violations in units of their limits, summed"""
-    success: Array
-    """(B, open) bool, latched for the episode"""
-    first_shot: Array
-    """(B,) bool: succeeded before a second distinct touch"""
-    final_observation: Observation | None = None
-    """Observations at the end of the episodes that ended, rows of all others stale;
-    None if none ended or worlds do not restart by themselves"""
 
 
 @dataclass(frozen=True)
@@ -53,6 +28,18 @@ class Episode:
     physics: dict[str, Array]
     """Physical parameters, (B,) each"""
 
+    @staticmethod
+    def empty(worlds: int, seats: int) -> Episode:
+        """Return counters at zero, of no episode yet."""
+        return Episode(
+            number=np.zeros(worlds, np.int64),
+            cycles=np.zeros(worlds, np.int64),
+            returns=np.zeros((worlds, seats)),
+            success=np.zeros((worlds, seats), np.bool_),
+            first_shot=np.zeros(worlds, np.bool_),
+            physics={},
+        )
+
     def counted(self, counters: dict[str, Array]) -> Episode:
         """Return the same with other arrays for some counters."""
         return replace(self, **counters)  # type: ignore[arg-type]
@@ -61,6 +48,25 @@ class Episode:
         """Return the same with arrays of its own, but for the physics."""
         names = [f.name for f in fields(self) if f.name != "physics"]
         return self.counted({name: getattr(self, name).copy() for name in names})
+
+    def draw_physics(
+        self, physics: Physics, stream: RandomStreams, worlds: Array
+    ) -> Array:
+        """Draw the physics of new episodes; return the worlds in which it is new.
+
+        Args:
+            physics: parameters and their ranges.
+            stream: of all worlds.
+            worlds: (W,) indices of those that begin an episode.
+        """
+        if not self.physics:
+            self.physics.update(physics.draw(stream))
+            return np.arange(len(self.number))
+        if not physics.varies:
+            return worlds[:0]
+        for name, value in physics.draw(stream.select(worlds)).items():
+            self.physics[name][worlds] = value
+        return worlds
 
     def begin(self, worlds: Array, cycles: Array | int = 0) -> None:
         """Set the counters of some worlds, by index, to those of a new episode."""

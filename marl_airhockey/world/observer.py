@@ -135,6 +135,31 @@ class Observer:
     ) -> tuple[Sink]:
         return (self._flat(layout, State(**sensed), memory, sensor["history"]),)
 
+    def after_step(
+        self,
+        shown: Sink,
+        sensed: State,
+        memory: Memory,
+        seats: Array,
+        served: Rows | None,
+    ) -> Observation:
+        """Return the observations of some seats after a step, freshly allocated.
+
+        Args:
+            shown: result of `show` for the new state.
+            sensed: the sensed state of all worlds, table frame.
+            memory: the scenario's, of all worlds.
+            seats: (n,) indices of seats.
+            served: worlds, by index, whose state has changed since; None for none.
+        """
+        if not shown:
+            return self.read(sensed, memory, seats)
+        own = {name: array.copy() for name, array in shown.items()}
+        observation = self.take(own, seats)
+        if served is None:
+            return observation
+        return self.renewed(observation, sensed, memory, seats, np.asarray(served))
+
     def renewed(
         self,
         observation: Observation,

@@ -1,4 +1,11 @@
-"""Checks of states and memories that are set from outside."""
+"""States and memories that are set from outside, checked and settled.
+
+`World.set_state` goes on as if every body had come there at its velocity and what
+touches had touched for long: lasting contacts and crossings are not new ones, the
+sensor's past is that of a steady motion, no delayed action is under way, and drivers
+begin anew. The clock is that of ``state.time``; returns and success begin at none.
+Episode number, seed, physics and random streams go on.
+"""
 
 from __future__ import annotations
 

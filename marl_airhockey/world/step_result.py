@@ -1,0 +1,66 @@
+"""Result of a step, as a world returns it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from marl_airhockey.types import Array
+from marl_airhockey.world.control_step import Moment
+from marl_airhockey.world.observer import Observation
+
+
+@dataclass
+class StepResult:
+    """Result of a step of B worlds for its open seats; arrays (B, ...), yours."""
+
+    observation: Observation
+    reward: Array
+    """(B, open)"""
+    terminated: Array
+    """(B,) the episode ended for a reason inside the game"""
+    truncated: Array
+    """(B,) the clock ended it"""
+    terms: dict[str, Array]
+    """Reward terms by name, (B, open) each"""
+    applied_action: Array
+    """(B, open, 2) command as a fraction of top speed, ego frame"""
+    violation: Array
+    """(B, seats, 5) excess of the action over the limits, see `limits.VIOLATIONS`"""
+    cost: Array
+    """(B, open) violations in units of their limits, summed"""
+    success: Array
+    """(B, open) bool, latched for the episode"""
+    first_shot: Array
+    """(B,) bool: succeeded before a second distinct touch"""
+    final_observation: Observation | None = None
+    """Observations at the end of the episodes that ended, rows of all others stale;
+    None if none ended or worlds do not restart by themselves"""
+
+    @staticmethod
+    def of(moment: Moment, open_seats: Array | None) -> StepResult:
+        """Return the result but for the observation; freshly allocated.
+
+        Args:
+            moment: after the step.
+            open_seats: (open,) indices of the open seats; None for all.
+        """
+        outcome, terms = moment.verdict.outcome, moment.verdict.terms
+        violation, success = moment.limited.violation.copy(), moment.episode.success
+        reward, applied = outcome["reward"], outcome["applied_action"]
+        rows = (reward, applied, violation[..., -1], success, *terms.values())
+        if open_seats is None:
+            own = [row.copy() for row in rows]
+        else:
+            own = [row[:, open_seats] for row in rows]
+        return StepResult(
+            observation={},
+            reward=own[0],
+            terminated=outcome["terminated"].copy(),
+            truncated=outcome["truncated"].copy(),
+            terms=dict(zip(terms, own[4:], strict=True)),
+            applied_action=own[1],
+            violation=violation,
+            cost=own[2],
+            success=own[3],
+            first_shot=moment.episode.first_shot.copy(),
+        )
