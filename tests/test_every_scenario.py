@@ -190,10 +190,9 @@ def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
     def stack(name):
         return np.stack([getattr(s, name) for s in states])
 
-    paths = [s.path for s in states if s.path is not None]
     names = ("position", "velocity", "angle", "spin", "touched", "touched_at")
     names += ("touching", "banked", "crossed", "crossed_velocity", "visible", "time")
-    path = np.stack([paths[0], *paths]) if paths else None
+    path = None if states[0].path is None else stack("path")
     recording = type(states[1])(
         game.scene.bodies, *(stack(name) for name in names), path=path
     )

@@ -212,7 +212,7 @@ def test_a_frozen_policy_is_one_small_file(tmp_path):
         np.clip(driver.predict(seen, True), -1, 1), mean, atol=1e-5
     )
     (tmp_path / "bad.npz").write_bytes(b"nothing")
-    with pytest.raises(ValueError, match="no frozen policy"):
+    with pytest.raises(ValueError, match="no policy of ours"):
         NumpyPolicy.load(tmp_path / "bad.npz")
 
 

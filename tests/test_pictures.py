@@ -42,7 +42,7 @@ def test_a_human_window_opens_and_closes():
 
 
 def test_a_square_block_is_drawn_turned():
-    env = ah.parallel_env("move_block", options={"shape": "square"})
+    env = ah.parallel_env("move_block", backend="pymunk", options={"shape": "square"})
     env.reset(seed=0)
     state = env.world.state.map(lambda x: x[0].copy())
     straight = draw(Frame(env.world.scene, state))

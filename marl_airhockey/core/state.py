@@ -12,6 +12,8 @@ from enum import IntEnum
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from marl_airhockey.types import Array
 
 
@@ -139,9 +141,15 @@ class State:
         return replace(self, **arrays)
 
     def write(self, worlds: Array, rows: State) -> None:
-        """Copy the `RESULTS` of ``rows`` (W, ...) into some worlds (W,), by index."""
+        """Copy the `RESULTS` of ``rows`` (W, ...) into some worlds (W,), by index.
+
+        The path becomes that of bodies that have been there all along.
+        """
         for name in RESULTS:
             getattr(self, name)[worlds] = getattr(rows, name)
+        if self.path is not None:
+            both = np.concatenate([rows.position, rows.velocity], -1)
+            self.path[worlds] = both[:, None, : self.bodies.movers]
 
 
 ARRAYS = tuple(f.name for f in fields(State) if f.name not in ("bodies", "path"))

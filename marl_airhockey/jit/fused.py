@@ -67,7 +67,12 @@ class Fused:
         """Return the sinks for all worlds of the sources, freshly allocated."""
         if self._loop is None:
             return self.prepare(*sources)
-        return self._loop(sources)
+        try:
+            return self._loop(sources)
+        except TypeError as error:
+            self._loop = None
+            self._refuse(error)
+        return self.prepare(*sources)
 
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
         """Return the function from sources into sinks that stay, as a stage.

@@ -64,7 +64,7 @@ class World:
             DrivenSeat(seat, driver, self.observer, b, dt)
             for seat, driver in sorted(drivers.items())
         ]
-        self._referee = Referee(scenario, self.reach.rotation, self.observer.show)
+        self.referee = Referee(scenario, self.reach.rotation, self.observer.show)
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
         self._seeded, self.seeds = False, np.zeros(b, np.int64)
         """(B,) seed of each world"""
@@ -195,7 +195,7 @@ class World:
     def _begin(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Begin an episode in some worlds, by index, from rows of state and memory."""
         if self._step is None:
-            parts = self.backend, self._referee, self.reach, self._limit
+            parts = self.backend, self.referee, self.reach, self._limit
             self._step = ControlStep(*parts, self._episode, rows, memory)
             self._adopt(self._step.now)
         self._place(worlds, rows, memory)
