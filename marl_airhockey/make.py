@@ -22,7 +22,7 @@ from marl_airhockey.world.build import Keywords, build_world
 def make_world(
     scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> World:
-    """B worlds as arrays: ``reset(seed)`` and ``step(actions (B, open, 2))``."""
+    """Build B worlds as arrays: ``reset(seed)``, ``step(actions (B, open, 2))``."""
     return build_world(scenario, num_worlds, autoreset=True, keywords=keywords)
 
 
@@ -32,7 +32,7 @@ def parallel_env(
     camera: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeyEnv:
-    """A PettingZoo ParallelEnv of a scenario; its open seats are the agents."""
+    """Build a PettingZoo ParallelEnv of a scenario; its open seats are the agents."""
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 
     return AirHockeyEnv(scenario, render_mode, camera, **keywords)
@@ -44,7 +44,7 @@ def env(
     camera: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AECEnv[str, Any, Any]:
-    """The same as a PettingZoo AEC environment, with its usual wrappers."""
+    """Build the same as a PettingZoo AEC environment, with its usual wrappers."""
     from pettingzoo.utils.conversions import parallel_to_aec
     from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
@@ -56,7 +56,7 @@ def env(
 def make_vec(
     scenario: str | Scenario, num_envs: int = 1, **keywords: Unpack[Keywords]
 ) -> AirHockeyVectorEnv:
-    """A gymnasium VectorEnv of a scenario with one open seat."""
+    """Build a gymnasium VectorEnv of a scenario with one open seat."""
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
 
     return AirHockeyVectorEnv(scenario, num_envs, **keywords)
@@ -65,7 +65,7 @@ def make_vec(
 def make_sb3_vec(
     scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> AirHockeyVecEnv:
-    """A stable-baselines3 VecEnv of num_worlds x open seats."""
+    """Build a stable-baselines3 VecEnv of num_worlds x open seats."""
     from marl_airhockey.core.errors import require
 
     require("stable_baselines3", "train")

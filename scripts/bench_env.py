@@ -90,7 +90,7 @@ def parallel(env: Any) -> Made:
 
 
 def ours(scenario: str, backend: str) -> Made:
-    """The PettingZoo environment of a scenario."""
+    """Return the PettingZoo environment of a scenario, ready to be stepped."""
     return parallel(ah.parallel_env(scenario, backend=backend))
 
 
@@ -215,7 +215,7 @@ def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
 
 
 def serve(make: Callable[..., Made], *args: Any) -> None:
-    """A peer's side: a round for every line of seconds, answered by a line of JSON."""
+    """Answer each line of seconds by a round's line of JSON: the side of a peer."""
     with open(os.dup(1), "w") as answers:
         os.dup2(2, 1)  # what a peer itself prints is no answer
         play, agents = make(*args)
@@ -227,7 +227,7 @@ def serve(make: Callable[..., Made], *args: Any) -> None:
 def peer(
     stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any
 ) -> MeasureRound:
-    """An environment in another interpreter, which gets the source of what it needs."""
+    """Start an environment in another interpreter, by the source of what it needs."""
     program = "\n".join(
         (
             "from __future__ import annotations",
@@ -263,7 +263,7 @@ def peer(
 
 @dataclass
 class Row:
-    """What is measured, warmed up when made, and what was found in each round."""
+    """Environment that is measured, warmed up when made, and its rounds."""
 
     name: str
     measure_round: MeasureRound
@@ -276,7 +276,7 @@ class Row:
 
     @property
     def agents(self) -> int:
-        """How many."""
+        """Number of agents."""
         return int(self.found[0]["agents"])
 
     def rates(self, unit: str) -> np.ndarray:
@@ -353,7 +353,7 @@ def rows(
 
 
 def show(found: list[dict[str, Any]], title: str) -> Table:
-    """A table with a line between what is compared in env-steps and in agent-steps."""
+    """Return a table, with a line between env-steps and agent-steps."""
     ours = {row["compared"]: row["ours"] for row in found}
     units = "; ".join(f"{unit} of {name}" for unit, name in ours.items())
     table = Table("", title=title, caption=f"ours: {units}")

@@ -1,1 +1,1 @@
-"""What a scenario, a driver and a backend owe."""
+"""Contracts of scenarios, drivers and backends."""

@@ -1,4 +1,4 @@
-"""Mark: see the definitions."""
+"""Mark: something to draw on the table that is no body."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from marl_airhockey.types import Array
 
 
 class Mark(NamedTuple):
-    """Something to draw on the table that is no body: a goal, a line, an arrow."""
+    """Mark on the table: a goal, a line, an arrow."""
 
     kind: Literal["circle", "line", "arrow"]
     start: tuple[float, float]
@@ -23,18 +23,18 @@ class Mark(NamedTuple):
 
     @staticmethod
     def circle(centre: Array, radius: float) -> Mark:
-        """A circle, m."""
+        """Return a circle, m."""
         return Mark("circle", (float(centre[0]), float(centre[1])), radius=radius)
 
     @staticmethod
     def across(table: Table, x: float) -> Mark:
-        """A line from one long side to the other, m."""
+        """Return a line from one long side to the other, m."""
         wide = float(table.size[1]) / 2
         return Mark("line", (float(x), -wide), (float(x), wide))
 
     @staticmethod
-    def arrow(start: Array, way: Array) -> Mark:
-        """An arrow from a point along a way, m."""
-        tip = np.asarray(start) + way
+    def arrow(start: Array, offset: Array) -> Mark:
+        """Return an arrow from a point along an offset, m."""
+        tip = np.asarray(start) + offset
         first = (float(start[0]), float(start[1]))
         return Mark("arrow", first, (float(tip[0]), float(tip[1])))

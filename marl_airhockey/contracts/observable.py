@@ -1,4 +1,4 @@
-"""How observations are laid out: columns with bounds, ego frames, pieces side by side.
+"""Observables: parts of an observation, with bounds, labels and ego frames.
 
 Vectors are in the seat's ego frame, SI units.
 """
@@ -17,8 +17,8 @@ from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 
 OBSERVE = ("velocity", "history", "pixels")
-"""What is shown of a puck: position and velocity; the last five sensed positions with a
-visibility flag, as a camera gives them; or pictures."""
+"""Forms of the puck in observations: position and velocity; the last five sensed
+positions with a visibility flag, as a camera gives them; or pictures."""
 
 
 HISTORY = 5
@@ -28,7 +28,7 @@ FRAMES = 3
 
 
 class Column(NamedTuple):
-    """One element of an observation.
+    """Element of an observation.
 
     ``(value - centre) / unit`` is of order one: the fixed scaling for a network.
     """
@@ -42,7 +42,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True)
 class ObservationContext:
-    """What pieces need to know to state their columns."""
+    """Context that observables need to state their columns."""
 
     scene: Scene
     observe: str
@@ -68,7 +68,7 @@ class ObservationContext:
     def place(
         self, name: str, unit: tuple[float, float], x: float = 0.0
     ) -> list[Column]:
-        """Columns of a position, centred at (x, 0)."""
+        """Return the columns of a position, centred at (x, 0)."""
         ex, ey = self.extent
         return [
             Column(f"{name}.x", -ex, ex, unit[0], x),
@@ -76,7 +76,7 @@ class ObservationContext:
         ]
 
     def gap(self, name: str, unit: tuple[float, float]) -> list[Column]:
-        """Columns of the way from one position to another."""
+        """Return the columns of the offset from one position to another."""
         ex, ey = 2 * self.extent
         return [
             Column(f"{name}.dx", -ex, ex, unit[0]),
@@ -84,12 +84,12 @@ class ObservationContext:
         ]
 
     def motion(self, name: str, most: float, unit: float) -> list[Column]:
-        """Columns of a velocity."""
+        """Return the columns of a velocity."""
         return [Column(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
 
 
 class EgoView:
-    """A sensed state and the scenario's memory, seen from every seat."""
+    """View from every seat of a sensed state and the scenario's memory."""
 
     def __init__(
         self, state: State, memory: Memory, history: Array, scope: ObservationContext
@@ -107,7 +107,7 @@ class EgoView:
         """(..., S, pucks, 2) m/s"""
 
     def rotate(self, vectors: Array) -> Array:
-        """(..., n, 2) vectors of the table frame to (..., S, n, 2) in ego frames."""
+        """Rotate (..., n, 2) of the table frame to ego frames, (..., S, n, 2)."""
         seats = vectors[..., None, :, :]
         if self.scope.straight:
             return seats
@@ -123,14 +123,14 @@ class EgoView:
 
 
 class Observable(ABC):
-    """A part of an observation."""
+    """Part of an observation."""
 
     goal: bool = False
     """True for the wanted goal, which goals="dict" shows apart."""
 
     @abstractmethod
     def columns(self, scope: ObservationContext) -> list[Column]:
-        """One column for each number."""
+        """Return a column for each number."""
 
     @abstractmethod
     def write(self, ego: EgoView, out: Array) -> None:

@@ -1,1 +1,1 @@
-"""The APIs: PettingZoo, Gymnasium, stable-baselines3."""
+"""Environments in the APIs of PettingZoo, Gymnasium and stable-baselines3."""

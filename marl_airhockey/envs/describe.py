@@ -1,4 +1,4 @@
-"""What there is, in words: read off the scenarios themselves."""
+"""Descriptions of scenarios, read off the scenarios themselves."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from marl_airhockey.world.build import build_world
 
 
 def what(scenario: Scenario) -> str:
-    """The sentence at the head of a scenario's file."""
+    """Return the sentence at the head of a scenario's file."""
     text = sys.modules[type(scenario).__module__].__doc__ or ""
     return text.strip().split("\n\n")[0]
 
 
 def summary() -> dict[str, Any]:
-    """Names of all scenarios, drivers and backends."""
+    """Return the names of all scenarios, drivers and backends."""
     rows = []
     for name in scenario_names():
         scenario = make_scenario(name)
@@ -51,7 +51,7 @@ def summary() -> dict[str, Any]:
 
 
 def describe(name: str) -> dict[str, Any]:
-    """Seats, observation, reward terms and options of a scenario."""
+    """Return seats, observation, reward terms and options of a scenario."""
     scenario = make_scenario(name)
     layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
     doc = (type(scenario).__doc__ or "").strip()

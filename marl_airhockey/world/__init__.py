@@ -1,1 +1,1 @@
-"""One control step of B worlds, from actions to rewards."""
+"""Worlds: one control step of B of them, from actions to rewards."""

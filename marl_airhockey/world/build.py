@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Keywords(TypedDict, total=False):
-    """What every environment can be built with; see `build_world` for meanings."""
+    """Keywords of every environment; see `build_world` for meanings."""
 
     backend: str
     drivers: Mapping[str, str | Driver]
@@ -124,7 +124,7 @@ def _check_times(control_dt: float, substeps: int, max_cycles: int | None) -> No
 
 
 def find_scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
-    """The scenario that keywords ask for."""
+    """Return the scenario that keywords ask for."""
     options = dict(keywords.get("options", {}))
     for shared in ("seats", "goals"):
         if shared in keywords:

@@ -38,7 +38,7 @@ class Moment(NamedTuple):
 
 
 class ControlStep:
-    """One control step of B worlds, from actions to rewards.
+    """Control step of B worlds, from actions to rewards.
 
     There are two moments, before and after, which change their parts at every step:
     what one holds is overwritten by the step after the next. The rules are compiled
@@ -85,7 +85,7 @@ class ControlStep:
 
     @property
     def now(self) -> Moment:
-        """The moment at which the worlds are."""
+        """Moment at which the worlds are."""
         return self._moments[self._now]
 
     def __call__(self) -> Moment:

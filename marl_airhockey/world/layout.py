@@ -1,4 +1,4 @@
-"""Layout: see the definitions."""
+"""Layout of an observation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from marl_airhockey.types import Array
 
 
 class ObservationLayout:
-    """The pieces of an observation side by side: bounds, labels, and how to read it."""
+    """Observables side by side: bounds, labels, and the numbers of an ego view."""
 
     def __init__(
         self, pieces: tuple[Observable, ...], scope: ObservationContext

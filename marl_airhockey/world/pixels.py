@@ -1,4 +1,4 @@
-"""What a seat sees as pixels."""
+"""Pixels that a seat sees."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def small_picture(
     seat: int,
     size: int,
 ) -> Array:
-    """What a seat sees as pixels: (size, size) uint8 grey, ego frame.
+    """Draw what a seat sees: (size, size) uint8 grey, ego frame.
 
     Args:
         scene: who is on the table.

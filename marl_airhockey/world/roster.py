@@ -25,7 +25,7 @@ class Roster:
         """(B, seats) which player sits where, by number; -1 for none of them."""
 
     def add(self, name: str, driver: Driver) -> int:
-        """The number of a new player."""
+        """Add a player and return its number."""
         world = self.world
         self._seats.append(
             [
