@@ -22,7 +22,7 @@ from marl_airhockey.types import Array
 
 
 class NumbaBackend(Backend):
-    """B worlds as rows of arrays, stepped by a compiled `kernel.advance`."""
+    """Backend with B worlds as rows of arrays, stepped by compiled `kernel.advance`."""
 
     exact: ClassVar[bool] = True
     default_substeps: ClassVar[int] = 10
@@ -76,7 +76,7 @@ class NumbaBackend(Backend):
         self._against[worlds] = self._touching_walls(state.puck[worlds])
 
     def _touching_walls(self, puck: Array) -> Array:
-        """(W, pucks, sides) bool: the puck (W, pucks, 2) touches that side's wall."""
+        """Return True (W, pucks, sides) where a puck (W, pucks, 2) touches a wall."""
         lines, radius = self._static.lines, self.scene.table.puck_radius
         normals, offsets, middles, half = np.split(lines, (2, 3, 5), axis=1)
         ahead = puck @ normals.T + offsets[:, 0]

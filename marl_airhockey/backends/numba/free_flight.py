@@ -1,4 +1,4 @@
-"""Free flight: worlds without a contact in a control step, and their closed form."""
+"""Free flight: closed form of worlds without a contact in a control step."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from marl_airhockey.types import Array
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def carry_over(batch: Batch) -> None:
-    """Fill the result with the state before the step, and no event."""
+    """Fill the result with the state before the step and no events."""
     previous, motion, events = batch.previous, batch.motion, batch.events
-    # Loops: for few worlds, numba's copies of whole arrays cost more than what they do.
+    # Loops: for few worlds, numba's copies of whole arrays are slower.
     worlds, bodies, _ = motion.position.shape
     _, paddles, pucks = events.touched.shape
     goal_lines, sides = events.crossed.shape[2], events.banked.shape[2]
@@ -51,15 +51,15 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
     """Mark the worlds in which a body may touch anything within the step.
 
     A ramp is a parabola, which lies between its control points; drag keeps a puck on
-    the path of free flight. So a body comes no nearer to a thing than the best of these
-    points, seen along the line to it at the beginning, and the distance of its fall.
+    the path of free flight. So a body comes no nearer to an object than the nearest of
+    these points, projected on the initial line to it, less the distance of its fall.
     """
     static, coefficients, commands, _, motion, events = batch
     paddles, pucks, blocks, radius, lines, _, obstacles, control_dt, n = static
     position, velocity, push = motion.position, motion.velocity, motion.push
     goal, out = commands.goal, events.out
     first, movers = paddles + pucks, paddles + pucks + blocks
-    # Where the control points of each body lie, from its place.
+    # Control points of each body relative to its position.
     early, late = np.zeros((movers, 2)), np.zeros((movers, 2))
     for b in range(len(coefficients)):
         met, drop = False, coefficients[b, FALL] * n * control_dt
@@ -83,7 +83,7 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
                 )
                 met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
         for i in range(paddles, first):
-            # A puck out of play meets nothing.
+            # A puck out of play touches nothing.
             if out[b, i - paddles]:
                 continue
             x, y, size = position[b, i, 0], position[b, i, 1], radius[i] + drop
