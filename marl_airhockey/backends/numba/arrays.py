@@ -9,7 +9,7 @@ import numpy as np
 from marl_airhockey.types import Array
 
 FALL, FADE, FLIGHT_FADE, FLIGHT_FALL, FLIGHT_DISTANCE, FLIGHT_DROP = range(6)
-WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, GRIP = range(6, 12)
+WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, FRICTION = range(6, 12)
 COEFFICIENTS = 12
 """Columns of a world's coefficients: speed that a substep takes from a puck's vx (m/s)
 and share of its speed that it leaves (1); the same for a whole step, and the distance
@@ -31,8 +31,8 @@ def make_coefficients(
         speed, drop = speed * fade, drop * fade - fall
     names = ("wall_restitution", "paddle_restitution", "block_restitution")
     rest = [values[n] for n in (*names, "puck_mass", "block_mass")]
-    grip = values["block_friction"] * dt
-    return np.stack([fall, fade, speed, drop, distance, lost, *rest, grip], axis=-1)
+    friction = values["block_friction"] * dt
+    return np.stack([fall, fade, speed, drop, distance, lost, *rest, friction], axis=-1)
 
 
 class Static(NamedTuple):

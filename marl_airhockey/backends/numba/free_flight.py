@@ -11,7 +11,7 @@ from marl_airhockey.backends.numba.arrays import (
     FLIGHT_DROP,
     FLIGHT_FADE,
     FLIGHT_FALL,
-    GRIP,
+    FRICTION,
     Batch,
 )
 from marl_airhockey.backends.numba.contacts import contact_obstacle
@@ -79,7 +79,7 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
                 met |= (
                     vx != 0.0
                     or vy != 0.0
-                    or coefficients[b, FALL] > coefficients[b, GRIP]
+                    or coefficients[b, FALL] > coefficients[b, FRICTION]
                 )
                 met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
         for i in range(paddles, first):

@@ -17,7 +17,7 @@ from marl_airhockey.backends.numba.arrays import (
     BLOCK_MASS,
     FADE,
     FALL,
-    GRIP,
+    FRICTION,
     PADDLE,
     PUCK_MASS,
     WALL,
@@ -188,7 +188,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
             reach[i] = radius[i] + shift
             reach[i] += (np.sqrt(most) + left * coefficients[b, FALL]) * left * dt
             awake[i] = i < first or most > 0.0 or shift > 0.0
-            awake[i] |= coefficients[b, FALL] > coefficients[b, GRIP]
+            awake[i] |= coefficients[b, FALL] > coefficients[b, FRICTION]
         hards[0] = softs[0] = 0
         fresh[0], crowd[0] = True, False
         for i in range(movers):
@@ -332,7 +332,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
     def hold_blocks(b: int) -> None:
         for i in range(first, movers):
             speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-            share = friction_share(speed, coefficients[b, GRIP])
+            share = friction_share(speed, coefficients[b, FRICTION])
             v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
 
     def settle(b: int, leapfrog_offset: float) -> None:

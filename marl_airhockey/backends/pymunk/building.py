@@ -31,7 +31,7 @@ class Bodies:
         """Shape of each body."""
         self.index: dict[pymunk.Shape, int] = {}
         """Index of each shape among those of its kind."""
-        self.grips: list[pymunk.Constraint] = []
+        self.friction_joints: list[pymunk.Constraint] = []
         """Friction joints of position and angle, two per block."""
         for i in range(len(scene.seats)):
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
@@ -66,7 +66,7 @@ class Bodies:
         ):
             joint.max_bias = 0.0
             self._space.add(joint)
-            self.grips.append(joint)
+            self.friction_joints.append(joint)
 
 
 class Walls:

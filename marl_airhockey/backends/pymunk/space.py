@@ -84,12 +84,14 @@ class Space:
             shape.elasticity = values["paddle_restitution"]
         for body in self.bodies.all[bodies.puck]:
             body.mass = values["puck_mass"]
-        mass, grip = values["block_mass"], values["block_friction"]
+        mass, friction = values["block_mass"], values["block_friction"]
         for i, body in enumerate(self.bodies.all[bodies.block]):
             self.bodies.shapes[bodies.block][i].elasticity = values["block_restitution"]
             body.mass = mass
-            self.bodies.grips[2 * i].max_force = mass * grip
-            self.bodies.grips[2 * i + 1].max_force = mass * grip * ARM * half
+            self.bodies.friction_joints[2 * i].max_force = mass * friction
+            self.bodies.friction_joints[2 * i + 1].max_force = (
+                mass * friction * ARM * half
+            )
             if self.scene.block_shape == "square":
                 body.moment = mass * (2 * half) ** 2 / 6
 
