@@ -43,7 +43,7 @@ class Striker(tactics.Scripted):
         bodies = state.bodies
         touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
 
-        due, place = self._meeting(puck, velocity, low + self.meet_at)
+        due, place = self._predict(puck, velocity, low + self.meet_at)
         rests = length(velocity) < 0.05
         place = np.where(rests[:, None], puck, place)
         out = self._target(view) - place
@@ -76,7 +76,7 @@ class Striker(tactics.Scripted):
         action = np.where(np.isfinite(due)[:, None], strike, home)
         return self._paced(action, view)
 
-    def _meeting(
+    def _predict(
         self, puck: Array, velocity: Array, line: float
     ) -> tuple[Array, Array]:
         """Predict when (W,) and where (W, 2) a puck falls to a line, banks included."""

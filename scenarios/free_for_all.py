@@ -1,4 +1,4 @@
-"""Everybody for themselves: a polygon with a goal and three lives for each."""
+"""Free for all: a polygon with a goal and three lives for each seat."""
 
 from __future__ import annotations
 

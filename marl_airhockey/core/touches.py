@@ -16,7 +16,7 @@ def no_touches(state: State) -> Memory:
     return {
         "touches": np.zeros_like(state.touched),
         "apart": np.where(state.touching, 0.0, np.inf),
-        "met": np.zeros(state.time.shape, np.bool_),
+        "any_touch": np.zeros(state.time.shape, np.bool_),
     }
 
 
@@ -24,8 +24,8 @@ def count_touches(memory: Memory, before: State, after: State) -> Memory:
     """Count distinct touches; return the new memory.
 
     ``touches`` (..., paddles, pucks) is their number, ``apart`` (..., paddles, pucks)
-    the time since the last contact ended (s, 0 while in contact), ``met`` (...) True
-    after the first touch. A puck cradled against the paddle counts as one touch.
+    the time since the last contact ended (s, 0 while in contact), ``any_touch`` (...)
+    True after the first touch. A puck cradled against the paddle counts as one touch.
     """
     dt = (after.time - before.time)[..., None, None]
     began = after.touched > 0
@@ -35,10 +35,10 @@ def count_touches(memory: Memory, before: State, after: State) -> Memory:
     return {
         "touches": memory["touches"] + distinct,
         "apart": np.where(after.touching, 0.0, apart),
-        "met": memory["met"] | distinct.any((-1, -2)),
+        "any_touch": memory["any_touch"] | distinct.any((-1, -2)),
     }
 
 
 def touched(memory: Memory) -> Array:
     """Return True (...) if any paddle has touched any puck in this episode."""
-    return memory["met"]
+    return memory["any_touch"]

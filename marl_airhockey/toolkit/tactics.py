@@ -129,12 +129,12 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
     return np.stack([np.full_like(aside, line), np.clip(aside, -wide, wide)], -1)
 
 
-LOOK, FURTHEST = 0.05, 1.2
+STEP, HORIZON = 0.05, 1.2
 """Time step and horizon of the prediction of a puck's path (s)."""
 
 
 @njit(cache=True, error_model="numpy")
-def _meeting(
+def _find_strike(
     place: Array,
     motion: Array,
     own: Array,
@@ -154,7 +154,7 @@ def _meeting(
     due, there, way = np.empty(len(own)), np.empty_like(own), np.empty_like(own)
     for w in range(len(own)):
         due[w] = np.inf
-        for moment in np.arange(0.0, FURTHEST + 0.5 * LOOK, LOOK):
+        for moment in np.arange(0.0, HORIZON + 0.5 * STEP, STEP):
             x = place[w, 0] + motion[w, 0] * moment
             y = place[w, 1] + motion[w, 1] * moment
             if np.isfinite(half):
@@ -164,8 +164,8 @@ def _meeting(
             ox, oy = ox / size, oy / size
             bx = min(max(x - ox * (touch + 0.03), low[0]), high[0]) - own[w, 0]
             by = min(max(y - oy * (touch + 0.03), low[1]), high[1]) - own[w, 1]
-            require = np.sqrt(bx * bx + by * by) / max(speed[w], 1e-6)
-            fits = low[0] < x < high[0] + 0.7 * touch and require <= moment + LOOK
+            needed = np.sqrt(bx * bx + by * by) / max(speed[w], 1e-6)
+            fits = low[0] < x < high[0] + 0.7 * touch and needed <= moment + STEP
             if fits or moment == 0.0:
                 there[w, 0], there[w, 1], way[w, 0], way[w, 1] = x, y, ox, oy
             if fits:
@@ -199,7 +199,7 @@ def attack(
     touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
     low, high = view.reach.min(0), view.reach.max(0)
 
-    due, there, way = _meeting(
+    due, there, way = _find_strike(
         place, motion, own, speed, aim, low, high, touch, field.half
     )
     contact = there - way * touch

@@ -84,10 +84,10 @@ def ramp_paddles(
             mean[i, axis] = velocity[i, axis] + 0.5 * ramp
             position[i, axis] += mean[i, axis] * dt
             velocity[i, axis] += ramp
-    met = separate_paddles(position, velocity, prescribed, lifted, diameter)
-    if met:
+    overlap = separate_paddles(position, velocity, prescribed, lifted, diameter)
+    if overlap:
         mean[:] = velocity
-    return met
+    return overlap
 
 
 @njit(cache=True)
@@ -107,7 +107,7 @@ def separate_paddles(
         lifted: (paddles,) bool: touches nothing.
         diameter: distance of two centres in contact, m.
     """
-    met = False
+    overlap = False
     for i in range(len(prescribed) - 1):
         for j in range(i + 1, len(prescribed)):
             nx = position[j, 0] - position[i, 0]
@@ -117,7 +117,7 @@ def separate_paddles(
                 continue
             if lifted[i] or lifted[j]:
                 continue
-            met = True
+            overlap = True
             if distance > 1e-9:
                 nx, ny = nx / distance, ny / distance
             else:
@@ -139,4 +139,4 @@ def separate_paddles(
                 velocity[i, 1] += (common - vi) * ny
                 velocity[j, 0] += (common - vj) * nx
                 velocity[j, 1] += (common - vj) * ny
-    return met
+    return overlap

@@ -62,7 +62,7 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
     # Control points of each body relative to its position.
     early, late = np.zeros((movers, 2)), np.zeros((movers, 2))
     for b in range(len(coefficients)):
-        met, drop = False, coefficients[b, FALL] * n * control_dt
+        near, drop = False, coefficients[b, FALL] * n * control_dt
         for i in range(movers):
             vx, vy = velocity[b, i, 0], velocity[b, i, 1]
             if i < paddles:
@@ -76,12 +76,12 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
                 early[i, 0], early[i, 1] = vx * control_dt, vy * control_dt
                 late[i, 0], late[i, 1] = early[i, 0], early[i, 1]
             else:
-                met |= (
+                near |= (
                     vx != 0.0
                     or vy != 0.0
                     or coefficients[b, FALL] > coefficients[b, FRICTION]
                 )
-                met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
+                near |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
         for i in range(paddles, first):
             # A puck out of play touches nothing.
             if out[b, i - paddles]:
@@ -90,11 +90,11 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
             for s in range(len(lines)):
                 nx, ny = lines[s, 0], lines[s, 1]
                 nearing = max(-(nx * late[i, 0] + ny * late[i, 1]), 0.0)
-                met |= nx * x + ny * y + lines[s, 2] < size + nearing
+                near |= nx * x + ny * y + lines[s, 2] < size + nearing
             if len(obstacles) > 0:
                 distance = np.sqrt(late[i, 0] ** 2 + late[i, 1] ** 2)
                 for o in range(len(obstacles)):
-                    met |= (
+                    near |= (
                         contact_obstacle(x, y, size + distance, obstacles, o)[0] > 0.0
                     )
         for i in range(first):
@@ -111,8 +111,8 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
                 other = max(-(dx * early[j, 0] + dy * early[j, 1]), 0.0)
                 other = max(other, -(dx * late[j, 0] + dy * late[j, 1]))
                 reach, left = radius[i] + radius[j] + drop, gap - mine - other
-                met |= left <= 0.0 or left * left < reach * reach * gap
-        may_collide[b] = met
+                near |= left <= 0.0 or left * left < reach * reach * gap
+        may_collide[b] = near
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -294,11 +294,11 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
                 dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
                 depth, nx, ny = contact_disc(dx, dy, radius[i] + radius[j])
             if i < paddles and j < first:
-                k, meets = j - paddles, depth > 0.0
-                if meets and not touching[b, i, k]:
+                k, touches = j - paddles, depth > 0.0
+                if touches and not touching[b, i, k]:
                     touched[b, i, k] += 1
                     touched_at[b, i, k] = time
-                touching[b, i, k] = meets
+                touching[b, i, k] = touches
             if depth <= 0.0:
                 continue
             fresh[0] = False

@@ -156,10 +156,10 @@ class Space:
         for k in range(self.substeps):
             self._substep, left = k, self.substeps - k
             motion = position, velocity, goal, imposed, lifted, left, self.dt, size
-            met = ramp_paddles(*motion, mean)
+            overlap = ramp_paddles(*motion, mean)
             for i, body in enumerate(self.bodies.all[seats]):
                 body.velocity = tuple(mean[i].tolist())
-                if met:
+                if overlap:
                     body.position = tuple((position[i] - mean[i] * self.dt).tolist())
             self.space.step(self.dt)
             if self._contact:
