@@ -1,1 +1,1 @@
-"""One file, one driver of a paddle. A file here is found by its name."""
+"""Drivers of paddles, one per file; a file is found by its name."""

@@ -1,4 +1,4 @@
-"""Guard the own goal and strike at the open one: an opponent for games."""
+"""Allround driver: guards the own goal and strikes at the open one, in games."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from marl_airhockey.toolkit import Array, View, tactics
 
 @dataclass
 class Allround(tactics.Scripted):
-    """Strikes a puck that it can get behind in time; else it guards."""
+    """Driver that strikes a puck which it can get behind in time, and else guards."""
 
     depth: float = 0.02
-    """m: where it guards, from the near edge of the reach."""
+    """Distance of the guarded line from the near edge of the reach (m)."""
     ready: float = 0.07
-    """m: where it waits, from its own end."""
+    """Distance of the waiting position from the own end (m)."""
     gain: float = 16.0
-    """1/s: asked speed for a metre of distance."""
+    """Commanded speed per distance (1/s)."""
     patience: float = 0.3
-    """s: a puck that can be met no sooner is waited for."""
+    """Time to a strike from which it waits instead (s)."""
     brave: float = 1.6
-    """m/s: a puck that comes faster is met by guarding."""
+    """Speed of an approaching puck from which it guards (m/s)."""
 
     def act(
         self, view: View, memory: dict[str, Array]

@@ -1,4 +1,4 @@
-"""Stand between the puck and one's own end."""
+"""Goalkeeper: stays between the puck and its own end."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from marl_airhockey.toolkit import Array, View, tactics
 
 @dataclass
 class Goalkeeper(tactics.Scripted):
-    """Goes where the nearest puck will cross a line near the own end, banks too."""
+    """Driver that moves to where the nearest puck, banks included, crosses its line."""
 
     depth: float = 0.03
-    """m: distance of the line from the near edge of the reach."""
+    """Distance of the line from the near edge of the reach (m)."""
     gain: float = 8.0
-    """1/s: asked speed for a metre of distance."""
+    """Commanded speed per distance (1/s)."""
 
     def act(
         self, view: View, memory: dict[str, Array]

@@ -1,4 +1,4 @@
-"""A person's pointer: the paddle goes where it points."""
+"""Mouse of a person: the paddle moves to the pointer."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from marl_airhockey.toolkit import Array, Driver, View, length
 
 
 class Mouse(Driver):
-    """Holds a wanted position and asks for a velocity that ends there at rest.
+    """Driver that commands a velocity which ends at rest at a wanted position.
 
-    What it asks is bounded by the seat's top speed and by a speed from which the paddle
-    can still stop in time; `limits` bounds it once more, as it does for everybody.
+    The command is bounded by the seat's top speed and by a speed from which the paddle
+    can still stop in time; `limits` bounds it further, as for every driver.
     """
 
     gain = 25.0
-    """1/s: asked speed for a metre of distance, near the target."""
+    """Commanded speed per distance near the target (1/s)."""
     brake = 0.6
-    """Share of the seat's acceleration that is reckoned with for stopping in time."""
+    """Share of the seat's acceleration that is assumed for stopping in time."""
 
     def __init__(self) -> None:
         self.target: tuple[float, float] | None = None
-        """Ego frame, m; None while nobody points."""
+        """Wanted position, ego frame, m; None without one."""
 
     def aim(self, x: float, y: float) -> None:
-        """Point at a place, ego frame, m."""
+        """Set the wanted position, ego frame, m."""
         self.target = (x, y)
 
     def rest(self) -> None:
-        """Point nowhere: stand still."""
+        """Clear the wanted position: stand still."""
         self.target = None
 
     def act(

@@ -1,4 +1,4 @@
-"""A learned policy from a file: a run folder, an SB3 zip or an ONNX file."""
+"""Learned policy from a file: a run folder, an SB3 zip, an ONNX or an .npz file."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ from marl_airhockey.toolkit.policies import Policy, load_policy
 
 
 def make(path: str | Path, deterministic: bool = True) -> Policy:
-    """Load the policy; see `learn.policy.load_policy`."""
+    """Load the policy; see `toolkit.policies.load_policy`."""
     return load_policy(path, deterministic)

@@ -1,4 +1,4 @@
-"""Ask for a new random velocity at every step."""
+"""Random driver: a new random velocity at every step."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from marl_airhockey.toolkit import Array, Driver, View
 
 
 class Random(Driver):
-    """Uniform in the action box."""
+    """Driver with actions uniform in the action box."""
 
     def act(
         self, view: View, memory: dict[str, Array]

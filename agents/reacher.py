@@ -1,4 +1,4 @@
-"""Go to the goal, with its velocity if it has one: a baseline for the reach tasks."""
+"""Reacher: moves to the goal, with its velocity if any; baseline of the reach tasks."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from marl_airhockey.toolkit import Array, Driver, View, length
 
 @dataclass
 class Reacher(Driver):
-    """Steers to the goal; a wanted velocity is met by a run-up behind the goal.
+    """Driver to the goal, with a run-up from behind it for a wanted velocity.
 
     Raises:
         ValueError: a scenario without a goal.
     """
 
     gain: float = 4.0
-    """1/s: asked speed for a metre of distance."""
+    """Commanded speed per distance (1/s)."""
     run_up: float = 0.22
-    """s before the goal at which the run begins."""
+    """Time before the goal at which the run-up begins (s)."""
 
     def act(
         self, view: View, memory: dict[str, Array]

@@ -1,4 +1,4 @@
-"""Ask for a random velocity and hold it for a while: luck that gets somewhere."""
+"""Sticky random driver: a random velocity held for some steps, to cover distance."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from marl_airhockey.toolkit import Array, Driver, RandomStreams, Seat, View
 
 @dataclass
 class Sticky(Driver):
-    """Uniform in the action box, drawn anew every ``hold`` steps."""
+    """Driver with actions uniform in the action box, drawn every ``hold`` steps."""
 
     hold: int = 10
+    """Number of steps that an action is held."""
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         return {"held": np.zeros((worlds, 2)), "age": np.zeros(worlds, np.int64)}

@@ -1,4 +1,4 @@
-"""Ask for no motion at all: the floor that every success rate stands on."""
+"""Still driver: no motion, the baseline of every success rate."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from marl_airhockey.toolkit import Array, Driver, View
 
 
 class Still(Driver):
-    """Never moves."""
+    """Driver that never moves."""
 
     def act(
         self, view: View, memory: dict[str, Array]

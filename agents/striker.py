@@ -1,4 +1,4 @@
-"""Meet the puck where it will be and strike it at what is to be hit."""
+"""Striker: predicts the puck and strikes it at the target of the task."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from marl_airhockey.toolkit import Array, View, length, tactics
 
 @dataclass
 class Striker(tactics.Scripted):
-    """Waits behind the meeting point and strikes through it; one puck at a time.
+    """Driver that waits behind the predicted contact and strikes through it.
 
-    It aims at the goal, at the first block, or straight up the middle; in games, at the
-    open goal. A puck at rest is struck where it lies.
+    It plays one puck at a time. It aims at the goal, at the first block, or straight up
+    the middle; in games, at the open goal. A puck at rest is struck in place.
     """
 
     meet_at: float = 0.22
-    """m from the near edge of the reach: where a falling puck is met."""
+    """Distance from the near edge of the reach at which a falling puck is hit (m)."""
     back: float = 0.07
-    """m: how far behind the contact it waits."""
+    """Distance behind the contact at which it waits (m)."""
     swing: float = 0.17
-    """s before the meeting at which it strikes."""
+    """Time before the contact at which it strikes (s)."""
     pull: float = 0.94
-    """m/s2: acceleration of a falling puck that it reckons with."""
+    """Acceleration of a falling puck that it assumes (m/s2)."""
     gain: float = 9.0
-    """1/s: asked speed for a metre of distance."""
+    """Commanded speed per distance (1/s)."""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -43,7 +43,7 @@ class Striker(tactics.Scripted):
         bodies = state.bodies
         touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
 
-        due, place = self._meeting(puck, velocity, low + self.meet_at)
+        due, place = self._predict(puck, velocity, low + self.meet_at)
         rests = length(velocity) < 0.05
         place = np.where(rests[:, None], puck, place)
         out = self._target(view) - place
@@ -67,7 +67,7 @@ class Striker(tactics.Scripted):
         return action / top, memory
 
     def _play(self, view: View) -> Array:
-        """In a game on a level table: strike, or wait at home."""
+        """Strike, or wait at home, in a game on a level table."""
         field, (pace, lag) = tactics.Field.of(view.scene, view.seat), self._skill
         aim = tactics.open_goal(view, field)
         strike, due = tactics.attack(view, field, aim, pace, lag)
@@ -76,10 +76,10 @@ class Striker(tactics.Scripted):
         action = np.where(np.isfinite(due)[:, None], strike, home)
         return self._paced(action, view)
 
-    def _meeting(
+    def _predict(
         self, puck: Array, velocity: Array, line: float
     ) -> tuple[Array, Array]:
-        """When and where a puck comes down to a line, with banks; (W,), (W, 2)."""
+        """Predict when (W,) and where (W, 2) a puck falls to a line, banks included."""
         drop = np.maximum(puck[:, 0] - line, 0.0)
         speed = velocity[:, 0]
         due = (speed + np.sqrt(speed * speed + 2 * self.pull * drop)) / self.pull

@@ -9,15 +9,15 @@ from marl_airhockey.toolkit.versus import Versus
 
 @dataclass(frozen=True, kw_only=True)
 class Doubles(Versus):
-    """Two seats at either end, side by side; see `versus.Versus` for the rules."""
+    """Game of two seats at either end, side by side; rules as in `versus.Versus`."""
 
     apart: float = 0.24
-    """m between mates at the start."""
+    """Distance of mates at the start (m)."""
 
     @property
     def lineup(self) -> tuple[tuple[int, float], ...]:
         y = self.apart / 2
-        # Each team has its first seat on its own left.
+        # The first seat of each team is on its own left.
         return (0, y), (0, -y), (2, -y), (2, y)
 
 

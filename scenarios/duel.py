@@ -9,7 +9,7 @@ from marl_airhockey.toolkit.versus import Versus
 
 @dataclass(frozen=True, kw_only=True)
 class Duel(Versus):
-    """Two seats at opposite ends; see `versus.Versus` for the rules."""
+    """Game of two seats at opposite ends; rules as in `versus.Versus`."""
 
     @property
     def lineup(self) -> tuple[tuple[int, float], ...]:

@@ -1,4 +1,4 @@
-"""Everybody for themselves: a polygon with a goal and three lives for each."""
+"""Free for all: a polygon with a goal and three lives for each seat."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class FreeForAll(Scenario):
-    """A goal costs its owner a life and 1; it pays 1 to whoever touched the puck last.
+    """Game in which a goal costs its owner a life and 1 and pays the last toucher 1.
 
-    Without lives a seat is out: its goal becomes wall and its paddle is parked. The
-    last one left has won. Serves go to whoever lost a life; a puck that is held for
-    ``possession`` seconds or lies out of every reach goes to the next one.
+    A seat without lives is out: its goal becomes wall and its paddle is parked. The
+    last seat left wins. Serves go to the seat that lost a life; a puck that is held for
+    ``possession`` seconds or is at rest out of every reach goes to the next seat.
     """
 
     seats: str = "arcade"
     seconds: float = 90.0
     sides: int = 4
-    """Sides of the table, and seats."""
+    """Number of sides of the table, and of seats."""
     inradius: float = 0.45
-    """m from the centre to each side."""
+    """Distance of each side from the centre (m)."""
     lives: int = 3
-    """Goals that a seat can take."""
+    """Number of goals after which a seat is out."""
     goal_width: float = 0.30
-    """m: width of the goal lines."""
+    """Width of the goal lines (m)."""
     possession: float = 5.0
-    """s: for so long a seat may have the puck in its reach."""
+    """Longest time that a seat may have the puck in its reach (s)."""
     jitter_weight: float = 0.0
 
     def __post_init__(self) -> None:
@@ -77,7 +77,7 @@ class FreeForAll(Scenario):
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         worlds = len(rng)
-        # The puck is on its way to the side that it was served to.
+        # The puck moves toward the side that it was served to.
         nearing = -state.puck_velocity[:, 0] @ self.table_geometry.normals.T
         return {
             **super().initial_memory(state, rng),
@@ -121,7 +121,7 @@ class FreeForAll(Scenario):
         }
 
     def _follower(self, lives: Array, side: int) -> Array:
-        """(...) the next seat after a side's that has lives."""
+        """(...) next seat with lives after a side."""
         follower = np.full_like(lives[..., 0], float(side))
         for step in range(self.sides - 1, 0, -1):
             other = (side + step) % self.sides

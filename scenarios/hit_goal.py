@@ -26,14 +26,14 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class HitGoal(GoalScenario):
-    """The rising puck's nearing the circle is rewarded, best so far, by the metre.
+    """Task that rewards how near the rising puck has come to the circle, per metre.
 
     Only a touched and rising puck counts: a falling one crosses the circle by chance.
     """
 
     seconds: float = 10.0
     radius: float = 0.10
-    """m, of the circle."""
+    """Radius of the circle (m)."""
 
     @cached_property
     def scene(self) -> Scene:

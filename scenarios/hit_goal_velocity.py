@@ -27,21 +27,21 @@ from marl_airhockey.toolkit.shots import legal_shots, shots_at
 
 @dataclass(frozen=True, kw_only=True)
 class HitGoalVelocity(GoalScenario):
-    """The best closeness so far of the rising puck, in place and velocity, is rewarded.
+    """Task that rewards the best match of the rising puck in position and velocity.
 
-    The goal is a moment of a legal shot at this very puck (see `shots.legal_shots`), so
-    that it can be met.
+    The goal is a point of a legal shot at this very puck (see `shots.legal_shots`), so
+    that it is feasible.
     """
 
     seconds: float = 10.0
     radius: float = 0.10
-    """m, of the circle."""
+    """Radius of the circle (m)."""
     angle: float = 15.0
-    """deg: largest angle to the wanted velocity."""
+    """Largest angle to the wanted velocity (deg)."""
     speed_share: float = 0.20
-    """Largest error of the speed, as a share of the wanted one."""
+    """Largest error of the speed, as a share of the wanted speed."""
     speed_slack: float = 0.05
-    """m/s: this much more."""
+    """Further error of the speed (m/s)."""
 
     @cached_property
     def scene(self) -> Scene:

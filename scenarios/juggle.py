@@ -25,7 +25,7 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Juggle(Scenario):
-    """A hit pays 1 once the puck has risen ``lift`` above where it was hit.
+    """Task in which a hit pays 1 when the puck has risen ``lift`` above its contact.
 
     A carried or cradled puck never rises above its last contact and earns nothing;
     losing a puck at home ends the episode and costs 2.
@@ -35,9 +35,9 @@ class Juggle(Scenario):
     pucks: int = 1
     """Number of pucks, 1 or 2."""
     lift: float = 0.2
-    """m: how far a hit must raise the puck's centre."""
+    """Height to which a hit must raise the puck's centre (m)."""
     hits: int = 4
-    """Hits that make a success."""
+    """Number of hits that is a success."""
 
     @cached_property
     def scene(self) -> Scene:

@@ -26,14 +26,15 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class MoveBlock(Scenario):
-    """Way of the block since the first touch is rewarded by the metre, best so far.
+    """Task that rewards the largest displacement of the block since the first touch.
 
-    Going to the puck, and after that the puck's nearing the block, show the way there.
+    The reward is per metre. Approaching the puck, and then the puck's approach to the
+    block, are rewarded as guidance.
     """
 
     seconds: float = 10.0
     way: float = 0.05
-    """m: how far the block must be moved from where it stood at the first touch."""
+    """Displacement of the block since the first touch that is a success (m)."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the block."""
 

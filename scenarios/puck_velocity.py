@@ -24,11 +24,11 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class PuckVelocity(Scenario):
-    """The best upward speed after a touch is rewarded, and so is going to the puck."""
+    """Task that rewards the best upward speed after a touch, and the approach."""
 
     seconds: float = 5.0
     fast: float = 1.5
-    """m/s: wanted upward speed."""
+    """Wanted upward speed (m/s)."""
 
     @cached_property
     def scene(self) -> Scene:

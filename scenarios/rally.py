@@ -23,19 +23,20 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Rally(Scenario):
-    """A crossing of the middle pays both 1 if the seat that it leaves struck it last.
+    """Game in which a crossing of the middle pays both 1 if it was struck from there.
 
-    That seat must not be the one of the last counted crossing. Only distinct touches
-    are strikes: a puck that both squeeze at the middle earns nothing. ``patience``
-    seconds without a counted crossing end the rally, and so does a puck that lies.
+    The seat whose half the puck leaves must have touched it last and must not be the
+    one of the last counted crossing. Only distinct touches are strikes: a puck that
+    both squeeze at the middle earns nothing. ``patience`` seconds without a counted
+    crossing end the rally, and so does a puck at rest.
     """
 
     seats: str = "arcade"
     seconds: float = 30.0
     crossings: int = 15
-    """Counted crossings that make a success."""
+    """Number of counted crossings that is a success."""
     patience: float = 4.0
-    """s"""
+    """Longest time without a counted crossing (s)."""
     jitter_weight: float = 0.0
 
     @cached_property
@@ -64,7 +65,7 @@ class Rally(Scenario):
         toucher = np.where(fresh.any(-1), latest, old)
         left = t.before.puck[..., 0, 0] < 0.0
         crossed = left != (t.after.puck[..., 0, 0] < 0.0)
-        # Numbers count from 1, as `last_toucher` does.
+        # Seats are numbered from 1, as in `last_toucher`.
         seat = np.where(left, 1.0, 2.0)
         counts = crossed & ((toucher == seat) | (old == seat))
         counts = counts & (t.memory["counted"] != seat)

@@ -24,16 +24,16 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Reach(GoalScenario):
-    """Progress toward the goal is rewarded, time costs, arriving pays once.
+    """Task that rewards progress toward the goal and, once, arrival; time costs.
 
     The goal is at least ``far`` from the paddle, so that standing still never succeeds.
     """
 
     seconds: float = 3.0
     radius: float = 0.02
-    """m: how close is there."""
+    """Distance that counts as arrival (m)."""
     far: float = 0.15
-    """m: shortest distance of a goal from the paddle."""
+    """Shortest initial distance of a goal from the paddle (m)."""
 
     @cached_property
     def scene(self) -> Scene:

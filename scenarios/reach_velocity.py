@@ -25,22 +25,22 @@ from marl_airhockey.toolkit.rewards import tolerance
 
 @dataclass(frozen=True, kw_only=True)
 class ReachVelocity(GoalScenario):
-    """The best closeness so far, in place and in velocity together, is rewarded.
+    """Task that rewards the best match so far of position and velocity together.
 
-    Being a best so far it cannot be farmed; the goal lies ``margin`` inside the reach,
-    so that its velocity can be had there in any direction.
+    As a running maximum it cannot be exploited; the goal lies ``margin`` inside the
+    reach, so that its velocity is feasible there in any direction.
     """
 
     seconds: float = 5.0
     radius: float = 0.04
-    """m: how close is there."""
+    """Distance that counts as arrival (m)."""
     error: float = 0.10
-    """m/s: largest error of the velocity."""
+    """Largest error of the velocity (m/s)."""
     slow: float = 0.2
     fast: float = 0.5
-    """m/s: range of the wanted speed."""
+    """Range of the wanted speed (m/s)."""
     margin: float = 0.08
-    """m: distance of a goal from every edge of the reach."""
+    """Least distance of a goal from every edge of the reach (m)."""
 
     @cached_property
     def scene(self) -> Scene:

@@ -24,17 +24,17 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Strike(Scenario):
-    """The best speed of the puck so far is rewarded, and so is going to it.
+    """Task that rewards the best speed of the puck so far, and approaching it.
 
-    Success wants speed and way at one step: a puck pushed along is not struck. From
-    rest a 0.7 m/s paddle gives at most 1.295 m/s.
+    Success requires speed and distance in the same step: a pushed puck is not struck.
+    From rest a 0.7 m/s paddle gives at most 1.295 m/s.
     """
 
     seconds: float = 2.0
     fast: float = 1.0
-    """m/s: wanted speed of the puck."""
+    """Wanted speed of the puck (m/s)."""
     distance: float = 0.3
-    """m: wanted distance from where it lay."""
+    """Wanted distance of the puck from its start (m)."""
 
     @cached_property
     def scene(self) -> Scene:

@@ -24,19 +24,20 @@ from marl_airhockey.toolkit import (
 
 ROWS = 5
 GAP = 0.004
-"""m between two blocks of the triangle."""
+"""Distance between neighbouring blocks of the triangle (m)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StrikeCrowd(Scenario):
-    """The summed displacement of the blocks is rewarded, best so far, by the metre.
+    """Task that rewards the largest summed displacement of the blocks, per metre.
 
-    Going to the puck and its best upward speed after a touch show the way there.
+    Approaching the puck and its best upward speed after a touch are rewarded as
+    guidance.
     """
 
     seconds: float = 7.5
     spread: float = 0.30
-    """m: wanted sum of displacements."""
+    """Wanted sum of displacements (m)."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the blocks."""
 

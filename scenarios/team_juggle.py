@@ -1,4 +1,4 @@
-"""Keep pucks up together, striking in turn."""
+"""Keep pucks up together, striking alternately."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class TeamJuggle(Scenario):
-    """A hit that raises a puck by ``lift`` pays both 1 if the other made the last one.
+    """Game in which a hit that raises a puck by ``lift`` pays both 1, in alternation.
 
-    The seats stand side by side at home, each with its own half of the width; a puck
-    that reaches home ends the episode.
+    The other seat must have made the last such hit. The seats are side by side at home,
+    each with its own half of the width; a puck that reaches home ends the episode.
     """
 
     seconds: float = 30.0
     pucks: int = 1
-    """Pucks to be kept up at once."""
+    """Number of pucks."""
     lift: float = 0.2
-    """m: how far a hit must raise the puck's centre."""
+    """Height to which a hit must raise the puck's centre (m)."""
     passes: int = 8
-    """Paid hits that make a success."""
+    """Number of paid hits that is a success."""
     gap: float = 0.10
-    """m between the reaches of the seats."""
+    """Distance between the reaches of the seats (m)."""
 
     @cached_property
     def scene(self) -> Scene:

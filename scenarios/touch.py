@@ -22,9 +22,9 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Touch(Scenario):
-    """Every distinct touch pays 1; losing the puck at home costs 1.
+    """Task in which every distinct touch pays 1; losing the puck at home costs 1.
 
-    Going to the puck before the first touch is rewarded by the metre.
+    Approaching the puck before the first touch is rewarded per metre.
     """
 
     seconds: float = 5.0

@@ -23,7 +23,7 @@ from marl_airhockey.backends.robosuite.osc import subtract_payload  # noqa: E402
 
 HOME = make_seat("robot", TABLE, 0)
 FASTEST = 0.9 * np.pi
-"""rad/s, of a UR5e's joints; what the robot seat promises"""
+"""Largest speed of a UR5e's joints that the robot seat promises (rad/s)."""
 HEIGHT, TILT, FORCE, JOINT, SHARE, SPEED = range(6)
 
 
@@ -33,7 +33,7 @@ def puck():
 
 
 def drive(world, driver, steps):
-    """The trace (steps * substeps, seats, 6) of a world under a rule."""
+    """Return the trace (steps * substeps, seats, 6) of a world under a rule."""
     rows, positions = [], []
     world.reset(0)
     for k in range(steps):
@@ -50,13 +50,13 @@ def unsteady(rng):
 def sweeping(rng):
     way = {}
 
-    def ask(k, world):
+    def action(k, world):
         if k % 12 == 0:
             angle = rng.uniform(0, 2 * np.pi, len(world.open))
             way["now"] = np.stack([np.cos(angle), np.sin(angle)], -1)[None]
         return way["now"]
 
-    return ask
+    return action
 
 
 @pytest.mark.parametrize("rule", [unsteady, sweeping])
@@ -97,7 +97,7 @@ def test_a_puck_falls_as_the_table_is_tilted():
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.6, 0.9])
 def test_walls_and_paddles_return_their_share(puck, speed, share):
     names = ("wall_restitution", "paddle_restitution")
-    puck.backend.worlds[0].surface.set_physics(FLAT | dict.fromkeys(names, share))
+    puck.backend.worlds[0].table_physics.set_physics(FLAT | dict.fromkeys(names, share))
     puck.reset((-0.7, 0.15), (0.0, 0.0, 0.0, speed))
     states = puck.run(0.3 / speed + 3 * DT)
     turned = [s.puck_velocity[0, 0, 1] for s in states if s.puck_velocity[0, 0, 1] < 0]
@@ -136,7 +136,7 @@ def test_nothing_escapes():
 
 @pytest.mark.parametrize("tilt", [0.0, 5.5])
 def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
-    from marl_airhockey.backends.robosuite.inverse_kinematics import reach_for
+    from marl_airhockey.backends.robosuite.inverse_kinematics import find_joint_angles
 
     seats = (HOME, make_seat("robot", TABLE, 2))
     env = AirHockey(scene=Scene(TABLE, seats, physics={"tilt": tilt}))
@@ -145,7 +145,7 @@ def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
     for i, seat in enumerate(seats):
         robot = env.robots[i]
         site = robot.eef_site_id["right"]
-        places, dofs = robot._ref_joint_pos_indexes, robot._ref_joint_vel_indexes
+        joints, dofs = robot._ref_joint_pos_indexes, robot._ref_joint_vel_indexes
         angles, jacobian = np.array(robot.init_qpos), np.zeros((6, model.nv))
         normals, offsets = half_planes(seat.reach)
         corners = np.array(seat.reach)
@@ -154,11 +154,12 @@ def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
             ego = corners.min(0) + share * np.ptp(corners, axis=0)
             if (normals @ ego + offsets < -1e-9).any():
                 continue
-            at = env.place.to_world(*(TABLE.rotation(seat.side).T @ ego))
-            grip = env.hands[i].grip
-            angles = reach_for(model, data, site, places, dofs, at, grip, angles)
+            at = env.frame.to_world(*(TABLE.rotation(seat.side).T @ ego))
+            foot = env.hands[i].foot_rotation
+            pose = at, foot, angles
+            angles = find_joint_angles(model, data, site, joints, dofs, *pose)
             mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], site)
-            plane = np.linalg.inv(jacobian[:, dofs])[:, :3] @ env.place.rotation[:, :2]
+            plane = np.linalg.inv(jacobian[:, dofs])[:, :3] @ env.frame.rotation[:, :2]
             assert seat.speed * np.linalg.norm(plane, axis=1).max() < FASTEST
 
 
@@ -166,22 +167,22 @@ def test_robosuites_own_steps_are_the_same():
     rng, bench = np.random.default_rng(3), Bench("robosuite")
     env = bench.backend.env
     env.reset()
-    env.surface.set_physics(FLAT)
+    env.table_physics.set_physics(FLAT)
     home = env.hands[0].home
     bench.reset(home, (-0.3, 0.02, 0.0, 0.0))
     data, own = env.sim.data._data, bench.backend.worlds[0].data
     data.qpos[:], data.qvel[:] = own.qpos, own.qvel
     env.sim.forward()
-    env.hands[0].rest()
+    env.hands[0].hold()
     furthest = 0.0
     for _ in range(40):
         env.step(rng.uniform(-1, 1, 2))
         state = bench.backend.step(bench.command(env.hands[0].new))
-        way = env.hands[0]
+        hand = env.hands[0]
         mujoco.mj_kinematics(env.sim.model._model, data)
-        furthest = max(furthest, np.abs(way.position[:2] - state.paddle[0, 0]).max())
+        furthest = max(furthest, np.abs(hand.position[:2] - state.paddle[0, 0]).max())
         np.testing.assert_allclose(
-            data.qpos[bench.backend.worlds[0].surface.places[0]],
+            data.qpos[bench.backend.worlds[0].table_physics.qpos_index[0]],
             state.puck[0, 0, 0],
             atol=1e-6,
         )
@@ -248,16 +249,16 @@ def test_the_law_does_not_know_of_a_payload():
     bench.reset((-0.6, 0.0), (0.5, 0.2, 0.0, 0.0))
     for load in (0.0, 0.6):
         world.set_physics(FLAT | {"arm_payload": load})
-        first = world.sim.arms[0, 1]
+        first = world.views.arms[0, 1]
         own = slice(first, first + 6)
         speeds = world.data.qvel[own]
         speeds[:] = (0.3, -0.2, 0.4, 0.1, -0.5, 0.2)
         mujoco.mj_step1(world.model, world.data)
         jacobian, rate = np.zeros((2, 6, world.model.nv))
-        site = world.sim.arms[0, 3]
-        place, body = world.data.site_xpos[site], world.model.site_bodyid[site]
+        site = world.views.arms[0, 3]
+        point, body = world.data.site_xpos[site], world.model.site_bodyid[site]
         mujoco.mj_jacSite(world.model, world.data, jacobian[:3], jacobian[3:], site)
-        mujoco.mj_jacDot(world.model, world.data, rate[:3], rate[3:], place, body)
+        mujoco.mj_jacDot(world.model, world.data, rate[:3], rate[3:], point, body)
         full = np.zeros((world.model.nv, world.model.nv))
         mujoco.mj_fullM(world.model, full, world.data.qM)
         felt, bias = full[own, own].copy(), world.data.qfrc_bias[own].copy()
@@ -281,7 +282,7 @@ def test_arms_differ_from_world_to_world():
     assert pushed["arm_payload"] - pushed["tilt"] == pytest.approx(GRAVITY, rel=0.1)
     arms = ah.make_world("juggle", 4, backend="robosuite", profile="robot")
     arms.reset(0)
-    stiff = [world.sim.gains[0, 0] for world in arms.backend.worlds]
+    stiff = [world.views.gains[0, 0] for world in arms.backend.worlds]
     np.testing.assert_allclose(stiff, arms.episode.physics["arm_stiffness"])
     assert len(set(stiff)) == 4
     with pytest.raises(ValueError, match=r"'arm_force'. is of arms.*backend='robos"):

@@ -1,4 +1,4 @@
-"""What is missing, and how to get it."""
+"""Errors: messages about missing packages and unknown names."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Iterable
 
 
 def require(module: str, extra: str) -> None:
-    """Check that a module of an optional extra is there.
+    """Check that a module of an optional extra is installed.
 
     Raises:
-        RuntimeError: it is not; the message is the line to type.
+        RuntimeError: it is not; the message holds the command that installs it.
     """
     if importlib.util.find_spec(module) is None:
         raise RuntimeError(
@@ -20,7 +20,7 @@ def require(module: str, extra: str) -> None:
 
 
 def unknown_name(what: str, name: object, known: Iterable[object]) -> str:
-    """A message that names what is unknown and lists what exists, closest first."""
+    """Return an error message: the unknown name and all known ones, closest first."""
     names = [str(n) for n in known]
     ratio = {n: difflib.SequenceMatcher(None, str(name), n).ratio() for n in names}
     ranked = sorted(names, key=lambda n: (-ratio[n], n))

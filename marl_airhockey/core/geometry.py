@@ -1,4 +1,4 @@
-"""Geometry: see the definitions."""
+"""Geometry of the plane: convex polygons, half-planes, lengths."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def clip(polygon: Array, normal: Array, offset: float) -> Array:
-    """The part of a convex polygon (n, 2) where normal . point + offset >= 0."""
+    """Cut a convex polygon (n, 2) to its part where normal . point + offset >= 0.
+
+    Raises:
+        ValueError: nothing of it is left.
+    """
     distance = polygon @ normal + offset
     kept: list[Array] = []
     for here, there, a, b in zip(
@@ -32,9 +36,14 @@ def clip(polygon: Array, normal: Array, offset: float) -> Array:
 
 
 def half_planes(polygon: tuple[tuple[float, float], ...]) -> tuple[Array, Array]:
-    """Inward unit normals (K, 2) and offsets (K,) of a counter-clockwise polygon.
+    """Return the half-planes whose intersection is a counter-clockwise polygon.
 
-    A point lies inside where ``normals @ point + offsets >= 0``.
+    Returns:
+        Inward unit normals (K, 2) and offsets (K,): a point lies inside where
+        ``normals @ point + offsets >= 0``.
+
+    Raises:
+        ValueError: a polygon that is not convex and counter-clockwise.
     """
     corners = np.asarray(polygon, dtype=float)
     ahead = np.roll(corners, -1, axis=0) - corners
@@ -46,7 +55,7 @@ def half_planes(polygon: tuple[tuple[float, float], ...]) -> tuple[Array, Array]
 
 
 def length(vector: Array) -> Array:
-    """Euclidean norm of (..., 2) vectors, (...)."""
+    """Return the Euclidean norms (...) of vectors (..., 2)."""
     x, y = vector[..., 0], vector[..., 1]
     size: Array = np.sqrt(x * x + y * y)
     return size

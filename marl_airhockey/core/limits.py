@@ -1,8 +1,8 @@
 """Limits: the one filter between the actions of all drivers and the paddles.
 
 A commanded velocity is within the top speed, within the acceleration of the one before,
-and toward an edge of the reach at most what can still brake in front of it, so that no
-position is ever clipped.
+and, toward an edge of the reach, no higher than a paddle can still brake from in front
+of it, so that no position is ever clipped.
 """
 
 from __future__ import annotations
@@ -17,19 +17,20 @@ from marl_airhockey.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
 JERK = 40.0
-"""1/s: a jerk is excessive beyond this times the acceleration limit, which is a full
-reversal of the acceleration within one 50 ms control step."""
+"""Jerk limit per acceleration limit (1/s): a full reversal of the acceleration within
+one control step of 50 ms."""
 
 
 class Limited(NamedTuple):
-    """Result of the limits: what is commanded, and what was taken off."""
+    """Result of the limits: the command, and by how much the action exceeded it."""
 
     velocity: Array
-    """(B, S, 2) m/s, table frame, reached at the end of the step by a linear ramp"""
+    """Velocity at the end of the step, which a linear ramp leads to; table frame
+    (B, S, 2), m/s"""
     acceleration: Array
-    """(B, S, 2) m/s2 of that ramp"""
+    """Acceleration of that ramp (B, S, 2), m/s2"""
     violation: Array
-    """(B, S, 5) excess of the action over each limit, 0 within it: see `VIOLATIONS`"""
+    """Excess of the action over each limit, 0 within it (B, S, 5): see `VIOLATIONS`"""
 
     @staticmethod
     def empty(worlds: int, seats: int) -> Limited:
@@ -46,6 +47,7 @@ four, each divided by its limit (the reach by the top speed)."""
 
 
 INFINITE = "action: every element must be finite, got nan or inf"
+"""Error message for an action that is not finite."""
 
 
 def limits_stage(
@@ -57,9 +59,10 @@ def limits_stage(
     dt: float,
     after: Limited,
 ) -> Stage:
-    """Return the limits from and into arrays that stay; all but actions in table frame.
+    """Return the stage that limits actions; it stops at one that is not finite.
 
-    It stops at an action that is not finite (`INFINITE`).
+    All arrays but the actions are in the table frame; the stage reads and writes them
+    in place, so they must outlive it. See `INFINITE` for the error message.
 
     Args:
         action: (B, S, 2) wanted velocity as a fraction of top speed, ego frames.
@@ -68,10 +71,10 @@ def limits_stage(
         before: position (B, N, 2) m and velocity (B, N, 2) m/s of all bodies, paddles
             first, whose velocity is the last command; acceleration (B, S, 2) m/s2 of
             the last step.
-        reach: of the seats.
-        top: (B,) top speed, m/s, and (B,) largest acceleration, m/s2.
+        reach: reaches of the seats.
+        top: top speed (B,), m/s, and largest acceleration (B,), m/s2.
         dt: length of a control step, s.
-        after: filled.
+        after: result, filled by the stage.
     """
     shared = (reach.normals, reach.offsets, reach.share, reach.rotation)
     fixed = map(Fixed, shared)
@@ -100,12 +103,12 @@ def _limit(
 ) -> bool:
     """Fill the result for each seat of each world; False at an infinite action."""
     edges, rate = normals.shape[1], 1.0 / dt
-    # The edges that are close, and how fast a paddle may go toward each.
+    # Edges that are close, and the highest speed toward each.
     close, fastest = np.empty(edges, np.int64), np.empty(edges)
 
-    # Functions in place: calls with arrays would cost more than the arithmetic.
+    # Inner function: a call with arrays would cost more than the arithmetic.
     def inside(s: int, count: int, x: float, y: float) -> tuple[float, float]:
-        """Take off a velocity what goes too fast toward an edge."""
+        """Remove the part of a velocity that is too fast toward the close edges."""
         for _ in range(passes):
             for i in range(count):
                 nx, ny = normals[s, close[i], 0], normals[s, close[i], 1]
@@ -133,7 +136,7 @@ def _limit(
             fit = most / max(change, most)
             wx, wy = vx + dx * fit, vy + dy * fit
 
-            # Toward edge k at most h: after this step a full stop must still fit.
+            # Highest speed h toward edge k: after this step a full stop must still fit.
             # This step takes (v + h) dt / 2; the stop h^2 / 2a and, in ramped steps,
             # up to h dt / 2 more. It never needs more than the planned deceleration.
             planned = hardest * share[s]
@@ -152,8 +155,8 @@ def _limit(
                 count += 1
             sx, sy = inside(s, count, wx, wy)
             if count and (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
-                # Toward pure braking until the change is allowed. Both ends of the way
-                # lie inside the (convex) bounds of the edges, so all of it does.
+                # Interpolate toward pure braking until the change is allowed. Both ends
+                # lie inside the (convex) bounds of the edges, so all between does.
                 bx, by = inside(s, count, vx, vy)
                 share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
                 sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
@@ -169,7 +172,7 @@ def _limit(
             jerk, rough = jx * jx + jy * jy, JERK * most
             fast = max(norm - top * (1 + 1e-6), 0.0)
             hard = max(change * rate - hardest * (1 + 1e-6), 0.0)
-            # Roots are dear; most worlds need neither.
+            # Roots are expensive; most worlds need neither.
             jerky = rate * (np.sqrt(jerk) - rough) if jerk > rough * rough else 0.0
             violation[b, s, 0], violation[b, s, 1] = fast, hard
             violation[b, s, 2], violation[b, s, 3] = jerky, held

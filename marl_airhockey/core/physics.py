@@ -1,6 +1,6 @@
-"""Physical parameters: their defaults, what is sane, and draws for each episode.
+"""Physical parameters: defaults, bounds, profiles and random draws per episode.
 
-A parameter is a number, or a range ``(low, high)`` drawn anew for every episode.
+A parameter is a number, or a range ``(low, high)`` drawn for every episode.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array
 
 Value = float | tuple[float, float]
+"""Fixed value of a parameter, or its range ``(low, high)``."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One physical parameter and the bounds outside which it is refused."""
+    """Physical parameter, with the bounds outside which a value is refused."""
 
     default: float
     low: float
@@ -30,7 +31,7 @@ class Parameter:
     unit: str
     meaning: str
     arms: bool = False
-    """Of arms alone: paddles that follow their command exactly have no such thing."""
+    """True for parameters that exist only on backends with robot arms."""
 
 
 PARAMETERS: dict[str, Parameter] = {
@@ -52,8 +53,8 @@ PARAMETERS: dict[str, Parameter] = {
     "arm_force": Parameter(40.0, 5.0, 80.0, "N", "of a paddle on the table", arms=True),
     "arm_payload": Parameter(0.0, 0.0, 1.0, "kg", "unknown to the arm", arms=True),
 }
-"""Every physical parameter. A pair's restitution is the lower of its bodies', a puck's
-being 1."""
+"""Physical parameters by name. A pair's restitution is the lower of its bodies'; that
+of a puck is 1."""
 
 
 ROBOT_SENSING: dict[str, float] = {
@@ -62,31 +63,32 @@ ROBOT_SENSING: dict[str, float] = {
     "position_noise": 0.002,
     "occlusion": 0.05,
 }
-"""What the robot profile adds: measured on cameras and arms of this class."""
+"""Delays and noise of the robot profile, measured on cameras and arms of this class."""
 
 
 ROBOT_SPREAD = 0.15
-"""Every parameter of the robot profile is drawn within this share of its value."""
+"""Half-width of the range of every parameter in the robot profile, per value."""
 
 
 PROFILES: tuple[str, ...] = ("ideal", "robot")
+"""Names of the profiles."""
 
 
 PUCK_SPEED_CAP = 5.0
-"""m/s; a squeezed puck may not gain more."""
+"""Highest speed of a puck (m/s), which bounds what a squeezed one can gain."""
 
 
 class Physics:
-    """The parameters of an environment: a value or a range for each name.
+    """Parameters of an environment: a value or a range for each name.
 
     Args:
         base: values that replace the defaults (table, seats, scenario).
         profile: "ideal", or "robot" for delays, noise and a spread of +-15 %.
-        given: the user's values and ranges; these win.
-        arms: whether arms hold the paddles, which have parameters, too.
+        given: the user's values and ranges; they override ``base`` and profile.
+        arms: True if the backend has robot arms, whose parameters exist then.
 
     Raises:
-        ValueError: an unknown name, or a value outside its sane bounds.
+        ValueError: an unknown name, or a value outside its bounds.
     """
 
     def __init__(
@@ -119,7 +121,7 @@ class Physics:
             self.ranges[name] = pair
 
     def draw(self, rng: RandomStreams) -> dict[str, Array]:
-        """One value of every parameter for each of W worlds: name -> (W,)."""
+        """Draw one value of every parameter for each of W worlds: name -> (W,)."""
         values = {}
         for name, (low, high) in self.ranges.items():
             if low == high:
@@ -129,7 +131,7 @@ class Physics:
         return values
 
     def highest(self, name: str) -> float:
-        """The largest value that a parameter can take here."""
+        """Return the largest value that a parameter can take here."""
         return self.ranges[name][1]
 
     @property
@@ -158,7 +160,7 @@ def _checked(name: str, value: Value) -> tuple[float, float]:
 
 
 def load_physics(path: Path) -> dict[str, Any]:
-    """A preset for ``physics=``: parameters by name, numbers or pairs, in TOML.
+    """Read a preset for ``physics=``: parameters by name, numbers or pairs, in TOML.
 
     Raises:
         ValueError: no such file.

@@ -1,4 +1,4 @@
-"""Random numbers: one stream a world, the same whatever the number of worlds.
+"""Random numbers: one stream per world, independent of the number of worlds.
 
 A stream is a counter hashed with splitmix64 (Steele, Lea and Flood, "Fast splittable
 pseudorandom number generators", 2014), so that a batch draws in one vector operation
@@ -52,9 +52,9 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
 
 
 class RandomStreams:
-    """Streams of W worlds; every method gives one row per world.
+    """Random streams of W worlds; every method returns one row per world.
 
-    ``select`` gives the same streams for some of the rows, so that a rejection loop
+    ``select`` returns the streams of some of the rows, shared, so that a rejection loop
     advances only the worlds that draw again.
     """
 
@@ -63,12 +63,12 @@ class RandomStreams:
 
     @classmethod
     def keyed(cls, seeds: Array, episodes: Array, purpose: str) -> RandomStreams:
-        """Streams keyed by (seed of the world, episode, purpose), at their beginning.
+        """Return new streams, keyed by seed of the world, episode and purpose.
 
         Args:
-            seeds: (W,) integer seeds, one a world.
+            seeds: (W,) integer seeds, one per world.
             episodes: (W,) integer episode numbers.
-            purpose: what the numbers are for; streams of two purposes are independent.
+            purpose: use of the numbers; streams of two purposes are independent.
         """
         rows = np.arange(len(seeds))
         keys, counts = np.zeros((2, len(rows)), np.uint64)
@@ -77,7 +77,7 @@ class RandomStreams:
         return rng
 
     def renew(self, rows: Array, seeds: Array, episodes: Array, purpose: str) -> None:
-        """Begin the streams of some worlds, by index, for their next episode."""
+        """Restart the streams of some worlds, by index, for their next episode."""
         salt = zlib.crc32(purpose.encode())
         _begin(self._keys, self._counts, rows, seeds, episodes, salt)
 
@@ -85,17 +85,17 @@ class RandomStreams:
         return len(self._rows)
 
     def select(self, rows: Array | slice) -> RandomStreams:
-        """The streams of ``rows`` (a mask or indices into these rows)."""
+        """Return the streams of ``rows`` (a mask or indices into these rows)."""
         return RandomStreams(self._keys, self._counts, self._rows[rows])
 
     def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
-        """(W, *shape) numbers uniform in [low, high)."""
+        """Draw (W, *shape) numbers uniform in [low, high)."""
         unit = np.empty((len(self._rows), math.prod(shape)))
         _unit(self._keys, self._counts, self._rows, unit)
         return low + (high - low) * unit.reshape(len(unit), *shape)
 
     def normal(self, *shape: int) -> Array:
-        """(W, *shape) standard normal numbers (Box and Muller's transform)."""
+        """Draw (W, *shape) standard normal numbers (Box and Muller's transform)."""
         pair = self.uniform(0.0, 1.0, 2, *shape)
         radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))

@@ -1,4 +1,4 @@
-"""Who and what is on the table: the static side of a scenario."""
+"""Scene: seats, bodies and goal lines on a table, the static side of a scenario."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class GoalLine:
-    """A goal line in the middle of a side, or (``width`` None) the whole side.
+    """Goal line in the middle of a side, or (``width`` None) the whole side.
 
     A puck crosses a goal line when its centre passes the side's line there; it crosses
     a goal line that is a whole side when it touches that wall.
@@ -25,12 +25,12 @@ class GoalLine:
     name: str
     side: int
     width: float | None = None
-    """m"""
+    """Width (m); None for the whole side."""
 
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A static disc, or a rounded segment if ``end`` is given."""
+    """Obstacle: a static disc, or a rounded segment if ``end`` is given; metres."""
 
     start: tuple[float, float]
     radius: float
@@ -50,14 +50,14 @@ class Scene:
     pucks: int = 0
     blocks: int = 0
     block_radius: float = 0.0377
-    """m; half the side of a square"""
+    """Radius of a disc, or half the side of a square (m)."""
     block_shape: Literal["disc", "square"] = "disc"
     obstacles: tuple[Obstacle, ...] = ()
     goal_lines: tuple[GoalLine, ...] = ()
     path: bool = False
-    """True if scenarios need positions at every substep."""
+    """True if the scenario needs positions at every substep."""
     physics: dict[str, float] = field(default_factory=dict, hash=False)
-    """Physical parameters that this scenario sets, by name."""
+    """Physical parameters that the scenario sets, by name."""
 
     def __post_init__(self) -> None:
         if not self.seats:
@@ -77,7 +77,7 @@ class Scene:
                 )
 
     def opening(self, goal_line: GoalLine) -> Array:
-        """(2, 2) ends of a goal line, in the order of its side's, m."""
+        """Return the ends (2, 2) of a goal line in the order of its side's, m."""
         start, end = self.table.ends(goal_line.side)
         if goal_line.width is None:
             return np.array([start, end])
@@ -98,13 +98,13 @@ class Scene:
         return Bodies(len(self.seats), *counts, radius)
 
     def goal_line(self, name: str) -> int:
-        """Index of the goal line with this name."""
+        """Return the index of the goal line with this name."""
         return [m.name for m in self.goal_lines].index(name)
 
     def still_state(self, worlds: int) -> State:
-        """Return rows with every body at the origin, at rest, and no contact.
+        """Return rows with movable bodies at rest at the origin and no contact.
 
-        Obstacles are at their places; arrays are freshly allocated.
+        Obstacles are at their positions; arrays are freshly allocated.
         """
         bodies, count = self.bodies, len(self.bodies)
         pucks, pairs = (worlds, bodies.pucks), (worlds, bodies.paddles, bodies.pucks)

@@ -1,4 +1,4 @@
-"""Seat: a place at the table for one paddle, its reach and its limits."""
+"""Seat: one paddle at a side of the table, its reach and its limits."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ SEAT_KINDS: tuple[str, ...] = ("robot", "arcade")
 
 @dataclass(frozen=True)
 class Seat:
-    """Place at the table: one paddle, what it can reach and how fast it can be."""
+    """Seat of one paddle: its side, the region of its centre, and its speed limits."""
 
     side: int
-    """The side of the table it belongs to."""
+    """Side of the table that it belongs to."""
     reach: tuple[tuple[float, float], ...]
-    """Convex polygon of the paddle's centre, ego frame, counter-clockwise, m."""
+    """Convex polygon around the paddle's centre; ego frame, counter-clockwise, m."""
     speed: float
-    """Top speed, m/s."""
+    """Top speed (m/s)."""
     acceleration: float
-    """Largest change of velocity, m/s2."""
+    """Largest acceleration (m/s2)."""
     team: int = 0
 
 
@@ -45,8 +45,8 @@ def make_seat(
 
     Args:
         kind: "robot" or "arcade".
-        table: the table.
-        side: which side of it.
+        table: table of the seat.
+        side: index of its side.
         others: sides that other seats own; a territory ends half-way to them.
         team: the team that the seat plays for.
     """
@@ -74,7 +74,7 @@ def make_seat(
     own = np.array([1.0, 0.0])
     rivals = [other for other in others if other != side]
     for other in rivals:
-        # Nearer to one's own side than to the other's, less the paddle's radius.
+        # Points nearer to the own side than to the other, less the paddle's radius.
         toward, gap = normals[other] - own, table.offsets[other] - table.offsets[side]
         length = np.linalg.norm(toward)
         polygon = clip(polygon, toward / length, gap / length - table.paddle_radius)
@@ -107,20 +107,20 @@ class ReachPlanes:
     """Reaches of S seats as half-planes of the table frame."""
 
     normals: Array
-    """(S, K, 2) inward unit normals; zero where a seat has fewer edges"""
+    """Inward unit normals (S, K, 2); zero where a seat has fewer edges"""
     offsets: Array
-    """(S, K) m; infinite where a seat has fewer edges"""
+    """Offsets (S, K), m; infinite where a seat has fewer edges"""
     share: Array
-    """(S,) of the acceleration that may be planned against one edge, so that braking
-    against both edges of a corner together stays within it"""
+    """Share of the acceleration that may be planned against one edge (S,), so that
+    braking against both edges of a corner together stays within the limit"""
     rotation: Array
-    """(S, 2, 2) from the table frame to each seat's ego frame"""
+    """Rotations from the table frame to each seat's ego frame (S, 2, 2)"""
     passes: int
-    """Rounds of projection: more than one if any corner is sharper than 90 degrees"""
+    """Number of projections: more than one if any corner is sharper than 90 degrees"""
 
     @staticmethod
     def of(table: Table, seats: tuple[Seat, ...]) -> ReachPlanes:
-        """Return the reaches of the seats of a table."""
+        """Return the half-planes of the seats of a table."""
         normals, offsets = reaches(table, seats)
         share, sharpest = np.ones(len(seats)), 1.0
         for s, seat in enumerate(seats):

@@ -1,7 +1,7 @@
-"""State of B worlds: what every backend reports and every scenario reads.
+"""State of B worlds: the output of every backend and the input of every scenario.
 
-Axes are named from the right, ``(..., bodies, 2)``. What stands to the left belongs to
-the caller: nothing, ``(B,)`` worlds, or ``(T, B)`` a stored dataset.
+Axes are named from the right, ``(..., bodies, 2)``. Axes to the left belong to the
+caller: none, ``(B,)`` worlds, or ``(T, B)`` of a stored dataset.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Bodies:
     blocks: int
     obstacles: int
     radius: tuple[float, ...]
-    """Radius of each body in metres; half the side of a square block."""
+    """Radius of each body, or half the side of a square block (m)."""
 
     @cached_property
     def kind(self) -> tuple[Kind, ...]:
@@ -70,71 +70,74 @@ class Bodies:
 
 @dataclass(frozen=True)
 class State:
-    """All bodies at one moment, in the table frame (or a seat's ego frame), SI units.
+    """State of all bodies at one time, table frame (or a seat's ego frame), SI units.
 
-    The contact fields tell what happened since the state before this one.
+    The contact fields hold the events since the previous state.
     """
 
     bodies: Bodies
     position: Array
-    """(..., N, 2) m"""
+    """Positions (..., N, 2), m"""
     velocity: Array
-    """(..., N, 2) m/s"""
+    """Velocities (..., N, 2), m/s"""
     angle: Array
-    """(..., N) rad"""
+    """Orientations (..., N), rad"""
     spin: Array
-    """(..., N) rad/s"""
+    """Angular velocities (..., N), rad/s"""
     touched: Array
-    """(..., paddles, pucks) contacts that began in the step"""
+    """Number of contacts that began in the step (..., paddles, pucks)"""
     touched_at: Array
-    """(..., paddles, pucks) s into the step of the last one that began, nan if none"""
+    """Time into the step at which the last of these began, nan without any
+    (..., paddles, pucks), s"""
     touching: Array
-    """(..., paddles, pucks) in contact at the end of the step"""
+    """True if in contact at the end of the step (..., paddles, pucks)"""
     banked: Array
-    """(..., pucks, sides) bounces off each side of the table that began in the step"""
+    """Number of bounces off each side that began in the step (..., pucks, sides)"""
     crossed: Array
-    """(..., pucks, goal_lines) bool: passed it, or touched one that is a whole side"""
+    """True if the puck passed the goal line, or touched one that is a whole side
+    (..., pucks, goal_lines)"""
     crossed_velocity: Array
-    """(..., pucks, goal_lines, 2) m/s of the puck as it crossed"""
+    """Velocity of the puck as it crossed (..., pucks, goal_lines, 2), m/s"""
     visible: Array
-    """(..., pucks) bool: seen by the sensor"""
+    """True if the sensor detects the puck (..., pucks)"""
     time: Array
-    """(...) s since the start of the episode"""
+    """Time since the start of the episode (...), s"""
     path: Array | None = None
-    """(..., K + 1, movers, 4) x, y, vx, vy at every substep, if the scene wants it"""
+    """Columns x, y, vx, vy at every substep (..., K + 1, movers, 4); None unless the
+    scene requires it"""
 
     @property
     def paddle(self) -> Array:
-        """(..., paddles, 2) positions, m."""
+        """Positions of the paddles (..., paddles, 2), m."""
         return self.position[..., self.bodies.paddle, :]
 
     @property
     def paddle_velocity(self) -> Array:
-        """(..., paddles, 2) m/s."""
+        """Velocities of the paddles (..., paddles, 2), m/s."""
         return self.velocity[..., self.bodies.paddle, :]
 
     @property
     def puck(self) -> Array:
-        """(..., pucks, 2) positions, m."""
+        """Positions of the pucks (..., pucks, 2), m."""
         return self.position[..., self.bodies.puck, :]
 
     @property
     def puck_velocity(self) -> Array:
-        """(..., pucks, 2) m/s."""
+        """Velocities of the pucks (..., pucks, 2), m/s."""
         return self.velocity[..., self.bodies.puck, :]
 
     @property
     def block(self) -> Array:
-        """(..., blocks, 2) positions, m."""
+        """Positions of the blocks (..., blocks, 2), m."""
         return self.position[..., self.bodies.block, :]
 
     @property
     def block_velocity(self) -> Array:
-        """(..., blocks, 2) m/s."""
+        """Velocities of the blocks (..., blocks, 2), m/s."""
         return self.velocity[..., self.bodies.block, :]
 
     def map(self, change: Callable[[Array], Array]) -> State:
-        """Return the state with ``change`` applied to every array, as picking rows."""
+        """Return the state with ``change``, say indexing, applied to every array."""
         arrays: dict[str, Any] = {n: change(getattr(self, n)) for n in ARRAYS}
         if self.path is not None:
             arrays["path"] = change(self.path)
@@ -158,6 +161,6 @@ EVENTS = (
     *("touched", "touched_at", "touching", "banked"),
     *("crossed", "crossed_velocity"),
 )
-"""Names of the fields that tell what happened in a step."""
+"""Names of the fields that hold the events of a step."""
 RESULTS = ("position", "velocity", "angle", "spin", "time", *EVENTS)
 """Names of the fields that every step of every backend writes."""

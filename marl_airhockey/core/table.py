@@ -1,4 +1,4 @@
-"""The table: a convex polygon, its sides, and the seats with their ego frames.
+"""Table: a convex polygon, its sides and their ego frames.
 
 Table frame: origin at the centroid; for a rectangle x runs along the length from the
 home end (side 0) to the far end, y to the left. The ego frame of a side is the table
@@ -16,12 +16,12 @@ from marl_airhockey.core.geometry import _cross
 from marl_airhockey.types import Array
 
 GRAVITY = 9.81
-"""m/s2"""
+"""Standard gravity (m/s2)."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A convex playing surface; defaults are given by `TABLES`.
+    """Convex playing surface; `TABLES` holds presets.
 
     Raises:
         ValueError: a polygon that is not convex and counter-clockwise about the
@@ -29,11 +29,11 @@ class Table:
     """
 
     vertices: tuple[tuple[float, float], ...]
-    """Corners in metres, counter-clockwise; side k runs from corner k to k + 1."""
+    """Corners (m), counter-clockwise; side k runs from corner k to k + 1."""
     paddle_radius: float = 0.047625
-    """m (3.75 in diameter)"""
+    """Radius of a paddle (m; 3.75 in diameter)."""
     puck_radius: float = 0.03175
-    """m (2.5 in diameter)"""
+    """Radius of a puck (m; 2.5 in diameter)."""
     physics: dict[str, float] = field(default_factory=dict, hash=False)
     """Physical parameters that come with this table, by name."""
 
@@ -57,22 +57,22 @@ class Table:
 
     @staticmethod
     def rectangle(length: float, width: float, **physics: float) -> Table:
-        """A table of ``length`` x ``width`` metres; side 0 is home, 2 the far end."""
+        """Return a table of ``length`` x ``width`` m; side 0 is home, 2 the far end."""
         x, y = length / 2, width / 2
         return Table(((-x, y), (-x, -y), (x, -y), (x, y)), physics=physics)
 
     @staticmethod
     def regular(sides: int, inradius: float) -> Table:
-        """A regular polygon whose sides lie ``inradius`` metres from the centre."""
+        """Return a regular polygon with sides ``inradius`` m from the centre."""
         radius = inradius / np.cos(np.pi / sides)
         angles = np.pi - np.pi / sides + 2 * np.pi * np.arange(sides) / sides
-        # Side 0 faces +x: it stands at x = -inradius, as home does on a rectangle.
+        # Side 0 faces +x: it lies at x = -inradius, as home does on a rectangle.
         corners = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
         return Table(tuple((float(x), float(y)) for x, y in corners))
 
     @cached_property
     def normals(self) -> Array:
-        """(sides, 2) inward unit normals."""
+        """Inward unit normals (sides, 2)."""
         corners = np.asarray(self.vertices, dtype=float)
         ahead = np.roll(corners, -1, axis=0) - corners
         ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
@@ -80,22 +80,22 @@ class Table:
 
     @cached_property
     def offsets(self) -> Array:
-        """(sides,) distance of each side from the origin, m."""
+        """Distances of the sides from the origin (sides,), m."""
         inward = (self.normals * np.asarray(self.vertices)).sum(-1)
         return np.asarray(-inward)
 
     @cached_property
     def size(self) -> Array:
-        """(2,) extent of the bounding box, m."""
+        """Extent of the bounding box (2,), m."""
         return np.asarray(np.ptp(np.asarray(self.vertices), axis=0))
 
     def ends(self, side: int) -> tuple[Array, Array]:
-        """The two corners of a side, (2,) each."""
+        """Return the two corners of a side, (2,) each, m."""
         corners = np.asarray(self.vertices, dtype=float)
         return corners[side], corners[(side + 1) % len(corners)]
 
     def rotation(self, side: int) -> Array:
-        """(2, 2) matrix that turns a table-frame vector into the side's ego frame."""
+        """Return the rotation (2, 2) from the table frame to the side's ego frame."""
         c, s = self.normals[side]
         return np.array([[c, s], [-s, c]])
 

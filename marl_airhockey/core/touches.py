@@ -8,24 +8,24 @@ from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 
 TOUCH_GAP = 0.15
-"""s: a touch is distinct if it begins this long after the last contact ended."""
+"""Least time (s) from the end of a contact to a touch that counts as distinct."""
 
 
 def no_touches(state: State) -> Memory:
-    """Return the memory of `count_touches` where an episode begins, (W, ...) rows."""
+    """Return the memory of `count_touches` at the start of an episode, W rows."""
     return {
         "touches": np.zeros_like(state.touched),
         "apart": np.where(state.touching, 0.0, np.inf),
-        "met": np.zeros(state.time.shape, np.bool_),
+        "any_touch": np.zeros(state.time.shape, np.bool_),
     }
 
 
 def count_touches(memory: Memory, before: State, after: State) -> Memory:
-    """Count distinct touches: ``touches`` and ``apart`` (..., paddles, pucks).
+    """Count distinct touches; return the new memory.
 
-    ``apart`` is the time in seconds since the last contact ended, 0 while in contact;
-    ``met`` (...) whether there was any touch yet. A puck cradled against the paddle
-    earns a single touch.
+    ``touches`` (..., paddles, pucks) is their number, ``apart`` (..., paddles, pucks)
+    the time since the last contact ended (s, 0 while in contact), ``any_touch`` (...)
+    True after the first touch. A puck cradled against the paddle counts as one touch.
     """
     dt = (after.time - before.time)[..., None, None]
     began = after.touched > 0
@@ -35,10 +35,10 @@ def count_touches(memory: Memory, before: State, after: State) -> Memory:
     return {
         "touches": memory["touches"] + distinct,
         "apart": np.where(after.touching, 0.0, apart),
-        "met": memory["met"] | distinct.any((-1, -2)),
+        "any_touch": memory["any_touch"] | distinct.any((-1, -2)),
     }
 
 
 def touched(memory: Memory) -> Array:
-    """(...) bool: any paddle has touched any puck in this episode."""
-    return memory["met"]
+    """Return True (...) if any paddle has touched any puck in this episode."""
+    return memory["any_touch"]

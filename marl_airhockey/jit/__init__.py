@@ -1,4 +1,4 @@
-"""Numpy functions traced once and compiled over worlds; pipelines; threads."""
+"""Compiler: numpy functions traced once and compiled over worlds; threads."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 def _drop_stale_code() -> None:
     """Delete compiled functions that are older than the newest source of the package.
 
-    numba looks at the file of a function alone, so that one which calls functions of
-    other files would go on running their old code after an edit.
+    numba checks only the file of a function itself, so that one which calls functions
+    of other files would keep running their old code after an edit.
     """
     package = Path(__file__).parents[1]
     newest = max(path.stat().st_mtime for path in package.rglob("*.py"))
     for compiled in package.rglob("*.nb[ic]"):
-        # Another process may delete them at the same time; without leave to write,
+        # Another process may delete them at the same time; without write permission,
         # numba keeps them elsewhere.
         with contextlib.suppress(OSError):
             if compiled.stat().st_mtime < newest:

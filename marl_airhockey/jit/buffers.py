@@ -1,4 +1,4 @@
-"""Fresh arrays for the results of calls, allocated for many calls at once."""
+"""Buffers: fresh arrays for the results of calls, allocated for many calls at once."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ import numpy as np
 from marl_airhockey.types import Array
 
 ROWS = 64
-"""Rows of every array that are allocated at once: numpy hands out rows of an array
-faster than new arrays."""
+"""Number of rows allocated at once: numpy indexes an array faster than it allocates a
+new one."""
 
 
 class BufferPool:
     """Pool of freshly allocated, uninitialised arrays.
 
     Args:
-        kinds: shape and type of a row of each array.
+        kinds: shape and dtype of a row of each array.
     """
 
     def __init__(self, kinds: Sequence[tuple[tuple[int, ...], Any]]) -> None:
@@ -29,7 +29,7 @@ class BufferPool:
         return {**vars(self), "_waiting": {}}
 
     def take(self, rows: int) -> tuple[Array, ...]:
-        """Return one array of each kind, with so many rows."""
+        """Return one array of each kind with this number of rows."""
         waiting = self._waiting.get(rows)
         if waiting:
             return waiting.pop()

@@ -1,7 +1,7 @@
-"""Code generator: writes a tape as a loop over worlds and has numba compile it.
+"""Code generator: writes a tape as a loop over worlds and compiles it with numba.
 
-The sources lie in the user's cache folder, with numba's compiled code beside them, so
-that a loop is compiled once per machine.
+The sources are kept in the user's cache folder, with numba's compiled code beside
+them, so that a loop is compiled once per machine.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from marl_airhockey.types import Array
 Call = Callable[..., tuple[dict[str, Array], ...]]
 """Function that calls a loop, with its output arrays and the mappings of inputs."""
 Name = tuple[int, str]
-"""Name of an input: number of its source, and its key there."""
+"""Name of an input: index of its source, and its key there."""
 
 INFIX = {
     "add": "+",
@@ -47,10 +47,10 @@ _loaded: dict[str, Loaded] = {}
 
 
 class Writer:
-    """Writer of a module for a tape: the loop, and how to call it with mappings.
+    """Writer of a module for a tape: the loop, and its call with mappings.
 
     Args:
-        tape: what was recorded.
+        tape: recorded operations.
         kinds: dtype of each input.
     """
 
@@ -58,15 +58,15 @@ class Writer:
         self._tape, self._kinds = tape, kinds
         self._stores: list[tuple[str, Any]] = []
         self._outputs: list[str] = []
-        """Their types"""
+        """Numba types of the outputs"""
         self._sinks: list[list[str]] = []
         self._live: set[Symbol] = set()
         self.inputs: dict[Name, str] = {}
-        """Variables of the inputs that are used, by name"""
+        """Variables of the used inputs, by name"""
         self._axes: dict[Name, int] = {}
 
     def begin_sink(self) -> None:
-        """Begin the next mapping of outputs."""
+        """Start the next mapping of outputs."""
         self._sinks.append([])
 
     def store(self, key: str, place: Array, dtype: Any) -> None:
@@ -79,7 +79,7 @@ class Writer:
             self._mark(place[index])
 
     def _mark(self, scalar: Any) -> None:
-        """Note what is needed for a scalar."""
+        """Mark the symbols that a scalar depends on as needed."""
         waiting = [scalar]
         while waiting:
             symbol = waiting.pop()
@@ -94,7 +94,7 @@ class Writer:
                 waiting += symbol.args
 
     def source(self, sources: int) -> str:
-        """Return the module, for a number of sources."""
+        """Return the source of the module for a number of sources."""
         live = [s for s in self._tape.symbols.values() if s in self._live]
         names = {symbol: f"t{i}" for i, symbol in enumerate(live)}
         body = [f"{names[s]} = {self._expression(s, names)}" for s in live]
@@ -160,22 +160,22 @@ def _type(dtype: Any, axes: int) -> str:
 
 
 class Loaded(NamedTuple):
-    """Generated module and its compiled function."""
+    """Generated module, and its compiled function."""
 
     kernel: Callable[..., Any]
-    """Compiled"""
+    """Compiled function of the module"""
     module: ModuleType
 
 
 def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Loaded:
-    """Have numba compile a module's ``kernel`` for its ``SIGNATURE``.
+    """Load a module and compile its ``kernel`` for its ``SIGNATURE`` with numba.
 
-    What this machine has not compiled yet is announced on stderr, once a name.
+    A compilation that is not in the cache is announced on stderr, once per name.
 
     Args:
-        source: of the module.
-        name: of what is compiled, for the announcement.
-        names: what it finds under these names besides.
+        source: text of the module.
+        name: subject of the announcement.
+        names: further global names of the module.
     """
     digest = hashlib.sha256(source.encode()).hexdigest()[:24]
     if digest not in _loaded:
@@ -189,7 +189,7 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
-        # Where numba looks when it loads a compiled loop of another day.
+        # The module must be importable when numba loads a loop from its cache.
         sys.modules[path.stem] = module
         spec.loader.exec_module(module)
         vars(module).update(names or {})
@@ -205,14 +205,14 @@ def _announce(name: str) -> None:
 
 @cache
 def package_hash() -> str:
-    """Hash of all sources of the package, which code that calls them depends on."""
+    """Return the hash of all sources of the package, a key of code that calls them."""
     files = sorted(Path(__file__).parents[1].rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 @cache
 def cache_folder() -> Path:
-    """Folder of compiled loops: MARL_AIRHOCKEY_CACHE, or the user's cache."""
+    """Return the folder of compiled loops: MARL_AIRHOCKEY_CACHE or the user's cache."""
     given = os.environ.get("MARL_AIRHOCKEY_CACHE")
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     folder = Path(given) if given else Path(home) / "marl_airhockey"

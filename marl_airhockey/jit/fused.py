@@ -1,9 +1,10 @@
-"""Fused: a pure numpy function over worlds, compiled into one loop over the worlds.
+"""Fused functions: pure numpy functions over worlds, each compiled into one loop.
 
 Scenarios and observables are written for arrays (..., *) whose leading axes are the
-caller's. So they can be run once on symbols of a single world (`tracer`), and what they
-did is compiled by numba: no temporaries, and no price of a numpy call for every
-operation. Code that cannot be traced runs as it is, with a warning that says why.
+caller's. So they can be run once on symbols of a single world (`tracer`), and the
+recorded operations are compiled by numba: no temporaries, and no cost of a numpy call
+per operation. Code that cannot be traced runs in numpy, with a warning that gives the
+reason.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from marl_airhockey.jit.tracer import Tape
 from marl_airhockey.types import Array
 
 Source = Mapping[str, Any]
-"""Named arrays (B, *), and other things that do not differ between worlds."""
+"""Named arrays (B, *), and other values that are the same in all worlds."""
 Sink = dict[str, Array]
 """Named arrays (B, *)."""
 Function = Callable[..., tuple[Sink, ...]]
@@ -31,21 +32,21 @@ Function = Callable[..., tuple[Sink, ...]]
 
 
 class Fused:
-    """Function of named arrays over worlds, compiled for the first ones it meets.
+    """Function of named arrays over worlds, compiled for the first arrays it gets.
 
     Args:
-        function: pure; takes mappings and gives mappings of arrays (..., *).
-        name: of what it does, for warnings and announcements.
+        function: pure function from mappings to mappings of arrays (..., *).
+        name: its subject in warnings and announcements.
     """
 
     def __init__(self, function: Function, name: str) -> None:
         self._function, self._name = function, name
         self._loop: _Loop | None = None
         self.refused: str | None = None
-        """Reason why it runs as plain numpy; None if it is compiled, or not yet met."""
+        """Reason why it runs in numpy; None if it is compiled or was not called yet."""
 
     def prepare(self, *sources: Source) -> tuple[Sink, ...]:
-        """Compile for arrays like these; return what it makes of them, fresh arrays."""
+        """Compile for arrays like these; return their sinks, freshly allocated."""
         plain = self._function(*sources)
         off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0"
         if self._loop is None and self.refused is None and not off:
@@ -57,7 +58,7 @@ class Fused:
                 self._refuse(error)
         if self._loop is not None:
             return self._loop(sources)
-        # Copies, as numpy may have handed on what it was given.
+        # Copies, as numpy may have returned its arguments.
         return tuple(
             {key: np.array(array, order="C") for key, array in sink.items()}
             for sink in plain
@@ -75,11 +76,11 @@ class Fused:
         return self.prepare(*sources)
 
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
-        """Return the function from sources into sinks that stay, as a stage.
+        """Return a stage that fills ``sinks`` from ``sources``, all kept by reference.
 
         Args:
-            sources: as those of `prepare`.
-            sinks: as those that it returned.
+            sources: mappings like those that `prepare` got.
+            sinks: mappings like those that it returned.
         """
         if self._loop is not None:
             return self._loop.stage(sources, sinks)
@@ -96,14 +97,14 @@ class Fused:
 
 
 def _write(function: Function, sources: tuple[Source, ...], sinks: Any) -> None:
-    """Call a function of numpy and copy its arrays into sinks."""
+    """Call a numpy function and copy its arrays into sinks."""
     for made, sink in zip(function(*sources), sinks, strict=True):
         for key, array in sink.items():
             array[...] = made[key]
 
 
 class _Loop:
-    """Traced function as a compiled loop; copies and pickles hold its source alone."""
+    """Traced function as a compiled loop; copies and pickles hold only its source."""
 
     def __init__(
         self,
@@ -164,13 +165,13 @@ class _Loop:
             return module.call(self._copying, outputs, *sources)  # type: ignore[no-any-return]
 
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
-        """See `Fused.stage`."""
+        """Return a stage that fills ``sinks`` from ``sources``; see `Fused.stage`."""
         given = [sources[i][key] for i, key in self._inputs]
         outputs = [array for sink in sinks for array in sink.values()]
         return Stage(self._load().kernel, (*given, *outputs))
 
     def _copying(self, *arrays: Array) -> None:
-        """Call the loop on copies of what is not contiguous or of another type.
+        """Call the loop on copies of arrays that are not contiguous or of another type.
 
         Raises:
             TypeError: a copy would lose precision.
@@ -189,7 +190,7 @@ class _Loop:
 
 
 def _compare(done: tuple[Sink, ...], plain: tuple[Sink, ...]) -> None:
-    """Refuse a loop that does not compute what numpy computed."""
+    """Check that the loop computes the same as numpy did."""
     for mine, real in zip(done, plain, strict=True):
         for key, array in real.items():
             if not np.allclose(mine[key], array, 1e-5, 1e-6, equal_nan=True):

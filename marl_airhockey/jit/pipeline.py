@@ -1,9 +1,9 @@
-"""Pipeline: functions called one after the other on arrays that stay.
+"""Pipeline: functions called one after the other on fixed arrays.
 
-Calling compiled code from Python costs some 50 ns for every array, and making an array
-as much again: for one world, that is more than all the arithmetic. So neighbouring
-stages that are compiled become one compiled function, which looks its arrays up by
-address. Stages in plain Python run between them. Both give the same numbers.
+Calling compiled code from Python costs some 50 ns per array, and allocating an array as
+much again: for one world, that is more than all the arithmetic. So neighbouring
+compiled stages become one compiled function, which finds its arrays by address. Stages
+in plain Python run between them. Both give the same numbers.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ class Fixed(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """Function and the arguments that it is called with at every step."""
+    """Function, and the arguments that it is called with at every step."""
 
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    """Arrays (B, *), `Fixed` ones, and numbers; anything for a function of Python"""
+    """Arrays (B, *), `Fixed` arrays and numbers; any values for a Python function"""
     stops: bool = False
-    """True if it returns False where the pipeline must end"""
+    """True if the function returns False to end the pipeline"""
 
     def __call__(self) -> bool:
-        """Call the function; False if the pipeline must end."""
+        """Call the function; return False if the pipeline must end."""
         given = [a.array if isinstance(a, Fixed) else a for a in self.arguments]
         going = self.function(*given)
         return bool(going) if self.stops else True
 
     @property
     def compiled(self) -> bool:
-        """True if numba compiles the function, and compiling is not switched off."""
+        """True if numba compiles the function and MARL_AIRHOCKEY_COMPILE is not 0."""
         off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0"
         return isinstance(self.function, Dispatcher) and not off
 
 
 @intrinsic
 def pointer(_: Any, address: Any) -> Any:
-    """Turn an address into the pointer that numba's `carray` takes."""
+    """Convert an address to the pointer that numba's `carray` takes."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], cgutils.voidptr_t)
@@ -66,9 +66,9 @@ class Pipeline:
     """Stages of a step, called in their order.
 
     Args:
-        rows: B.
-        stages: of a step; their arrays must stay where they are.
-        name: of what is done, for the line that says that it is being compiled.
+        rows: number of worlds B.
+        stages: stages of a step; their arrays must not be reallocated.
+        name: its subject in the announcement of a compilation.
     """
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
@@ -81,7 +81,7 @@ class Pipeline:
                 self._parts.extend(part)
 
     def __call__(self) -> bool:
-        """Call all stages, or those up to one that stops: False."""
+        """Call the stages in order; return False, without the rest, if one stops."""
         # A generator would cost more than the calls.
         for part in self._parts:  # noqa: SIM110
             if not part():
@@ -90,11 +90,11 @@ class Pipeline:
 
 
 class _Compiled:
-    """Stages as one compiled function, which several threads may share by rows."""
+    """Stages as one compiled function, whose rows several threads may share."""
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
         self._rows, self._stages = rows, stages
-        """Stages are kept, as the addresses are those of their arrays."""
+        """Stages, kept because the addresses are those of their arrays."""
         arrays = list(_arrays(stages))
         self._addresses = np.array([a.ctypes.data for a, _ in arrays], np.int64)
         self._strides = np.array([s * a.strides[0] for a, s in arrays], np.int64)
@@ -116,7 +116,7 @@ class _Compiled:
 
 
 def _arrays(stages: Sequence[Stage]) -> Iterator[tuple[Array, int]]:
-    """Yield the arrays of all arguments, and 1 for those that have rows, else 0."""
+    """Yield each array of the arguments, with 1 if it has rows of worlds, else 0."""
     for stage in stages:
         for argument in stage.arguments:
             array = argument.array if isinstance(argument, Fixed) else argument
@@ -126,7 +126,7 @@ def _arrays(stages: Sequence[Stage]) -> Iterator[tuple[Array, int]]:
 
 
 def _source(stages: Sequence[Stage]) -> str:
-    """Write the module of a pipeline, the same for any number of worlds."""
+    """Return the source of a pipeline, the same for any number of worlds."""
     views: list[str] = []
     calls: list[str] = []
     for i, stage in enumerate(stages):
@@ -147,7 +147,7 @@ def _source(stages: Sequence[Stage]) -> str:
         calls += [f"if not {call}:", "    return False"] if stage.stops else [call]
     lines = [
         '"""Written by marl_airhockey.jit.pipeline; may be deleted at any time."""',
-        # What numba keeps of a pipeline holds the code of the functions that it calls.
+        # The cached code of a pipeline holds the code of the functions that it calls.
         f"# {package_hash()}",
         *(f"# f{i}: {_called(stage.function)}" for i, stage in enumerate(stages)),
         "import numpy as np",

@@ -1,7 +1,7 @@
-"""Threads for rows of worlds, used by loops that release Python's lock.
+"""Threads over rows of worlds, used by loops that release Python's lock.
 
-MARL_AIRHOCKEY_THREADS says how many threads there may be (1). They sleep while there is
-nothing to do, so that they take nothing from others.
+MARL_AIRHOCKEY_THREADS is the largest number of threads (default 1). They sleep while
+idle, so that they take no CPU time from other processes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from functools import cache
 from itertools import pairwise
 
 LEAST = 2048
-"""Rows of cheap worlds that pay for a thread."""
+"""Number of rows of cheap worlds from which a thread pays."""
 
 
 @cache
@@ -32,7 +32,7 @@ def threads() -> int:
 
 
 def use_threads(number: int | None) -> int | None:
-    """Set the number of threads, here and in processes that begin here.
+    """Set the number of threads in this process and its future child processes.
 
     Raises:
         ValueError: fewer than one.
@@ -50,18 +50,18 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads(), "marl_airhockey")
 
 
-# A child of a process has none of its threads.
+# A forked process has none of its parent's threads.
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> None:
-    """Call ``work`` on slices of rows 0 .. ``rows``, side by side.
+    """Call ``work`` on slices of rows 0 .. ``rows`` in parallel.
 
     Args:
-        work: done for a slice.
-        rows: how many there are.
-        least: rows that pay for a thread.
+        work: function of a slice.
+        rows: number of rows.
+        least: number of rows from which a thread pays.
     """
     parts = min(threads(), rows // least)
     if parts < 2:
@@ -74,5 +74,5 @@ def over_rows(work: Callable[[slice], None], rows: int, least: int = LEAST) -> N
 
 
 def spreads(rows: int) -> bool:
-    """Tell whether so many rows go to more than one thread."""
+    """Return True if this number of rows is shared by several threads."""
     return threads() > 1 and rows >= 2 * LEAST

@@ -1,4 +1,4 @@
-"""Tracer: numpy code run on its symbols writes down the arithmetic of one world.
+"""Tracer: numpy code that runs on its symbols records the arithmetic of one world.
 
 An array of symbols is an object array, so that indexing, broadcasting and stacking are
 numpy's own; only arithmetic is recorded, element by element.
@@ -15,15 +15,15 @@ import numpy as np
 from marl_airhockey.types import Array
 
 Scalar = Any
-"""Symbol, or a number that is known when the code is traced."""
+"""Symbol, or a number that is known while tracing."""
 
 
 class Untraceable(Exception):
-    """Code whose control flow depends on traced values, or that has no rule here."""
+    """Error for control flow that depends on traced values, or calls without a rule."""
 
 
 class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
-    """Number of one world: an operation on others, with its value in a sample."""
+    """Scalar of one world: an operation on other symbols, and its value in a sample."""
 
     __slots__ = ("args", "op", "tape", "value")
     __hash__ = object.__hash__
@@ -40,16 +40,16 @@ class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
         return _apply(ufunc.__name__, ufunc, *plain)
 
     def __bool__(self) -> bool:
-        raise Untraceable("it asks for the truth of a number that differs by world")
+        raise Untraceable("it branches on a number that differs by world")
 
     def __float__(self) -> float:
-        raise Untraceable("it turns a number that differs by world into a float")
+        raise Untraceable("it converts a number that differs by world into a float")
 
     __int__ = __index__ = __float__
 
 
 class Tape:
-    """Symbols of a trace, each operation once, in the order of their making."""
+    """Symbols of a trace, each operation once, in the order of creation."""
 
     def __init__(self) -> None:
         self.symbols: dict[Any, Symbol] = {}
@@ -62,7 +62,7 @@ class Tape:
         return self.symbols[key]
 
     def array(self, name: tuple[int, str], sample: Array) -> Symbols:
-        """Return symbols of an input of one world with the values of a sample."""
+        """Return the symbols of an input of one world, with the values of a sample."""
         out = np.empty(sample.shape, object)
         for index in np.ndindex(sample.shape):
             value = sample[index]
@@ -71,7 +71,7 @@ class Tape:
 
 
 def _apply(op: str, function: Callable[..., Any], *args: Scalar) -> Scalar:
-    """Apply an operation to scalars: a number if all are known, else a symbol."""
+    """Apply an operation to scalars; return a number if all are known, or a symbol."""
     values = [a.value if isinstance(a, Symbol) else a for a in args]
     with np.errstate(all="ignore"):
         value = np.asarray(function(*values))[()]
@@ -87,7 +87,7 @@ def _each(op: str, function: Callable[..., Any], arrays: Sequence[Any]) -> Symbo
     def one(*args: Scalar) -> Scalar:
         return _apply(op, function, *args)
 
-    # Base-class arrays, or numpy would come back here.
+    # Base-class arrays, or numpy would recurse into this function.
     plain = [np.asarray(a).astype(object) for a in arrays]
     done = np.frompyfunc(one, len(plain), 1)(*plain)
     out = np.empty(np.shape(done), object)
@@ -124,7 +124,7 @@ SPECIAL: dict[Any, Callable[..., Any]] = {
     np.zeros_like: _zeros_like,
     np.full_like: _full_like,
 }
-"""Functions of numpy that are no operation on single elements."""
+"""Rules for numpy functions that do not work element by element."""
 
 
 class Symbols(np.ndarray[Any, Any]):
@@ -158,7 +158,7 @@ class Symbols(np.ndarray[Any, Any]):
         return done
 
     def astype(self, dtype: Any, *_: Any, **__: Any) -> Any:
-        """Return symbols of the numbers as another type."""
+        """Return the symbols converted to another dtype."""
         kind = np.dtype(dtype)
         return _each(kind.name, kind.type, (self,))
 
@@ -171,7 +171,7 @@ def _reduce(
     keepdims: bool = False,
     **_: Any,
 ) -> Symbols:
-    """Apply a reduction as one operation after the other."""
+    """Apply a reduction as a sequence of binary operations."""
     symbols: Array = np.asarray(array).astype(object)
     chosen = range(symbols.ndim) if axis is None else np.atleast_1d(axis)
     axes = sorted(int(a) % symbols.ndim for a in chosen)
@@ -190,7 +190,7 @@ def _reduce(
 
 
 def _counted(item: Scalar) -> Scalar:
-    """Return a truth as 0 or 1, as a sum takes it."""
+    """Convert a bool to 0 or 1, as numpy does in sums."""
     value = item.value if isinstance(item, Symbol) else item
     if isinstance(value, (bool, np.bool_)):
         return _apply("int64", np.int64, item)

@@ -1,4 +1,4 @@
-"""Toolkit: all that scenario and agent files are made with, in one import."""
+"""Toolkit: everything that scenario and agent files import."""
 
 from __future__ import annotations
 

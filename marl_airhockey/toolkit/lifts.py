@@ -10,10 +10,10 @@ from marl_airhockey.types import Array, Memory
 
 
 def contact_height(t: Transition) -> Array:
-    """(..., pucks) x of each puck where a paddle last met it in this step, m.
+    """(..., pucks) x of each puck at its last contact with a paddle in this step, m.
 
-    It is where the puck flew to until the contact began, and where it is now while the
-    contact lasts; nan if there was none.
+    During a contact it is the present x, else the x in free flight at the time when the
+    contact began; nan without a contact.
     """
     at = np.where(t.after.touched > 0, t.after.touched_at, np.nan)
     last = np.fmax.reduce(at, axis=-2)
@@ -22,7 +22,7 @@ def contact_height(t: Transition) -> Array:
 
 
 def no_lifts(state: State) -> Memory:
-    """Return the memory of `lifts` at the start of an episode, (W, pucks) rows."""
+    """Return the memory of `lifts` at the start of an episode, arrays (W, pucks)."""
     pucks = state.visible.shape
     return {"armed": np.zeros(pucks), "struck_at": np.full(pucks, -0.5)}
 
@@ -31,8 +31,8 @@ def lifts(t: Transition, lift: float) -> tuple[Memory, Array]:
     """Follow pucks from a hit until they have risen by ``lift`` above it, m.
 
     Returns:
-        ``armed``, 1 from the hit until then, and ``struck_at``, its x in m, and
-        whether the puck has risen so far in this step, all (..., pucks).
+        New memory: ``armed``, 1 from the hit until then, and ``struck_at``, its x (m);
+        and True for pucks that have risen so far in this step. All (..., pucks).
     """
     height = contact_height(t)
     struck = ~np.isnan(height)

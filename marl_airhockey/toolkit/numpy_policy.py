@@ -15,14 +15,14 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class NumpyPolicy:
-    """Network of rectified layers that gives the mean action.
+    """Network with ReLU layers that returns the mean action.
 
     Args:
         layers: (out, in) weights and (out,) biases of each layer.
-        centre: (D,) taken off the observation.
-        unit: (D,) that it is divided by then.
-        log_std: (2,) of the action noise in training.
-        card: scenario and its version, how it was trained, how good it is.
+        centre: (D,) subtracted from the observation.
+        unit: (D,) divisor of the difference.
+        log_std: (2,) log standard deviation of the action noise in training.
+        card: scenario and its version, settings and results of the training.
     """
 
     layers: Sequence[tuple[Array, Array]]
@@ -32,7 +32,7 @@ class NumpyPolicy:
     card: Mapping[str, Any] = field(default_factory=dict)
 
     def __call__(self, observation: Array, deterministic: bool = True) -> Array:
-        """Return (B, 2) mean actions for observations (B, D); noise is the driver's."""
+        """Return mean actions (B, 2) for observations (B, D); the driver adds noise."""
         x = (observation - self.centre) / self.unit
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)
@@ -40,7 +40,7 @@ class NumpyPolicy:
         return np.asarray(x @ weight.T + bias)
 
     def save(self, path: Path) -> None:
-        """Write an .npz with the card in it; a kill leaves the old file or the new."""
+        """Write an .npz that includes the card; the file is replaced atomically."""
         arrays: dict[str, Any] = {
             f"weight_{i}": w for i, (w, _) in enumerate(self.layers)
         }
@@ -61,7 +61,7 @@ class NumpyPolicy:
         """Read a file that `save` wrote.
 
         Raises:
-            ValueError: not such a file.
+            ValueError: a file of another kind.
         """
         try:
             with np.load(path, allow_pickle=False) as file:

@@ -1,6 +1,6 @@
-"""Observation pieces that scenarios share: what a seat is shown.
+"""Observables that scenarios share: the parts of a seat's observation.
 
-A scenario lists pieces; spaces, labels and scales follow from their columns.
+A scenario lists observables; spaces, labels and scales follow from their columns.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class OwnPaddle(Observable):
-    """The seat's own paddle: position and velocity, as its robot reports them."""
+    """Position and velocity of the seat's own paddle, as its robot reports them."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         centre = float(np.mean([x for x, _ in scope.scene.seats[0].reach]))
@@ -39,7 +39,7 @@ class OwnPaddle(Observable):
 
 @dataclass(frozen=True)
 class OtherPaddles(Observable):
-    """The other paddles, mates first, each group by ego angle of its seat's side."""
+    """Positions and velocities of the other paddles, mates first, by ego angle."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         columns = []
@@ -77,7 +77,7 @@ def _others(scene: Scene) -> Array:
 
 @dataclass(frozen=True)
 class Pucks(Observable):
-    """Every puck: position and velocity, or its sensed history."""
+    """Position and velocity of every puck, or its sensed history."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         columns: list[Column] = []
@@ -107,7 +107,7 @@ class Pucks(Observable):
 
 @dataclass(frozen=True)
 class OwnToPucks(Observable):
-    """The way from the seat's own paddle to every puck."""
+    """Vector from the seat's own paddle to every puck."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"own_to_puck_{i}" for i in range(scope.scene.pucks)]
@@ -119,10 +119,10 @@ class OwnToPucks(Observable):
 
 @dataclass(frozen=True)
 class Blocks(Observable):
-    """Where every block is now."""
+    """Position of every block."""
 
     x: float
-    """Where blocks are to be expected, m."""
+    """Typical x of blocks (m), the centre of the scaling."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"block_{i}" for i in range(scope.scene.blocks)]
@@ -134,7 +134,7 @@ class Blocks(Observable):
 
 @dataclass(frozen=True)
 class PuckToBlocks(Observable):
-    """The way from puck 0 to every block."""
+    """Vector from puck 0 to every block."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"puck_0_to_block_{i}" for i in range(scope.scene.blocks)]
@@ -147,7 +147,7 @@ class PuckToBlocks(Observable):
 
 @dataclass(frozen=True)
 class Touched(Observable):
-    """1 once any paddle has touched any puck."""
+    """Flag: 1 after any paddle has touched any puck, else 0."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         return [Column("touched", 0.0, 1.0, 1.0)]
@@ -158,7 +158,7 @@ class Touched(Observable):
 
 @dataclass(frozen=True)
 class Goal(Observable):
-    """A wanted place, and its way from the own paddle or from puck 0.
+    """Goal position, and the vector to it from the own paddle or from puck 0.
 
     ``memory["goal"]`` is (..., 2) in the table frame.
     """
@@ -166,7 +166,7 @@ class Goal(Observable):
     unit: tuple[float, float]
     x: float
     origin: str
-    """"own" or "puck": what the goal is for."""
+    """Body that is to reach the goal: "own" or "puck"."""
     goal = True
 
     def columns(self, scope: ObservationContext) -> list[Column]:
@@ -182,7 +182,7 @@ class Goal(Observable):
 
 @dataclass(frozen=True)
 class GoalVelocity(Observable):
-    """A wanted velocity, ``memory["goal_velocity"]`` (..., 2) in the table frame."""
+    """Goal velocity, ``memory["goal_velocity"]`` (..., 2) in the table frame."""
 
     most: float
     unit: float
@@ -197,7 +197,7 @@ class GoalVelocity(Observable):
 
 @dataclass(frozen=True)
 class PossessionTime(Observable):
-    """How long each puck has been in the reach of one's own team, s; see `held`."""
+    """Time that each puck has been in reach of the own team, s; see `rewards.held`."""
 
     most: float
 
@@ -211,7 +211,7 @@ class PossessionTime(Observable):
 
 @dataclass(frozen=True)
 class PerSeat(Observable):
-    """Everybody's number of the memory (..., seats), one's own first, then `Others`."""
+    """Memory values per seat (..., seats): the own one, then as in `OtherPaddles`."""
 
     name: str
     most: float
@@ -229,9 +229,9 @@ class PerSeat(Observable):
 
 @dataclass(frozen=True)
 class IsThisSeat(Observable):
-    """Whose number the memory holds: 1 one's own, -1 another's, 0 nobody's.
+    """Seat number in the memory, compared: 1 for this seat, -1 another, 0 none.
 
-    ``memory[name]`` is (...) or, one a puck, (..., pucks); see `rewards.last_toucher`.
+    ``memory[name]`` is (...) or, per puck, (..., pucks); see `rewards.last_toucher`.
     """
 
     name: str
@@ -249,14 +249,14 @@ class IsThisSeat(Observable):
 
 @dataclass(frozen=True)
 class FromMemory(Observable):
-    """Numbers of the memory, one a puck, that are no vectors: flags and heights."""
+    """Memory values per puck that are no vectors: flags and heights."""
 
     name: str
     low: float
     high: float
     unit: float
     from_own: bool = False
-    """True to show a height as seen from the own paddle."""
+    """True for a height relative to the own paddle."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"{self.name}_{i}" for i in range(scope.scene.pucks)]

@@ -25,7 +25,7 @@ Raised whenever classes that a run pickles, or settings that it names, move: run
 another format are refused.
 """
 KINDS = ("zip", "npz")
-"""Endings of the files that engines write."""
+"""File name extensions of the policies that engines write."""
 
 
 @dataclass
@@ -33,11 +33,11 @@ class Policy(Driver):
     """Learned policy as a driver.
 
     Args:
-        predict: observation (B, ...) and whether to be deterministic -> (B, 2).
-        shape: of the observation that it was trained on; None if it does not say.
-        observe: the form of that observation; None for the environment's.
-        source: where it came from, for messages.
-        deterministic: act by the mean rather than sample.
+        predict: function (observation (B, ...), deterministic) -> action (B, 2).
+        shape: of the observation that it was trained on; None if unknown.
+        observe: form of that observation; None for the environment's.
+        source: origin of the policy, for messages.
+        deterministic: return the mean action instead of a sample.
     """
 
     predict: Predict
@@ -46,7 +46,7 @@ class Policy(Driver):
     source: str = "policy"
     deterministic: bool = True
     noise: Array | None = None
-    """(2,) deviation of sampled actions, if `predict` gives means alone."""
+    """Standard deviation of sampled actions (2,), if `predict` returns only means"""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -70,8 +70,8 @@ def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
     An SB3 zip holds pickled Python: load only files that you trust.
 
     Raises:
-        ValueError: not such a file; the message says what was expected.
-        RuntimeError: a missing extra, with the line that installs it.
+        ValueError: a file of another kind; the message names the expected ones.
+        RuntimeError: a missing extra; the message holds the command that installs it.
     """
     path = Path(path)
     if path.is_dir():
@@ -137,7 +137,7 @@ def _load_sb3(path: Path, deterministic: bool) -> Policy:
     if not kinds:
         raise ValueError(f"{wrong} of PPO, A2C, SAC, TD3 or DDPG (found {module})")
     try:
-        # Without the schedules of training, which a policy does not need.
+        # Training schedules are dropped: a policy does not need them.
         plain = {"lr_schedule": lambda _: 0.0, "clip_range": lambda _: 0.0}
         model = kinds[0].load(path, device="cpu", custom_objects=plain)
     except Exception as error:
@@ -160,7 +160,7 @@ def _predict_sb3(policy: Any, observation: Any, deterministic: bool) -> Array:
 
 
 class _OnnxModel:
-    """ONNX model; copies and pickles hold its bytes and open a session anew."""
+    """ONNX model; copies and pickles hold its bytes and open a new session."""
 
     def __init__(self, source: str, content: bytes) -> None:
         self._source, self._content = source, content

@@ -1,4 +1,4 @@
-"""Possession: who has a puck, who touched it last, and pucks that lie."""
+"""Possession: time in reach of a seat, last toucher, and pucks at rest."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
 
 SLOW = 0.05
-"""m/s: a slower puck lies."""
+"""Speed below which a puck is at rest (m/s)."""
 
 
 def last_toucher(who: Array, after: State) -> Array:
     """(..., pucks) number of the seat that touched each puck last; ``who`` if none did.
 
-    Numbers count from 1, 0 being nobody.
+    Seats are numbered from 1; 0 means none.
     """
     at = np.where(after.touched > 0, after.touched_at, -1.0)
     at = np.where(after.touching, np.inf, at)
@@ -31,9 +31,9 @@ def last_toucher(who: Array, after: State) -> Array:
 
 
 def held(scene: Scene, t: Transition) -> Array:
-    """(..., seats, pucks) s that a puck has been in reach of a seat or of a mate's.
+    """(..., seats, pucks) time a puck has been in reach of a seat or its mates, s.
 
-    It goes on from ``held`` of the memory.
+    It continues ``held`` of the memory.
     """
     dt = (t.after.time - t.before.time)[..., None, None]
     has = in_reach(scene, t.after.puck)
@@ -44,12 +44,12 @@ def held(scene: Scene, t: Transition) -> Array:
 
 
 def lying(t: Transition, clocks: Array) -> Array:
-    """(..., pucks) s that a puck has lain, slower than 0.05 m/s, out of every reach.
+    """(..., pucks) time a puck has been slower than 0.05 m/s out of every reach, s.
 
-    It goes on from ``lying`` of the memory.
+    It continues ``lying`` of the memory.
 
     Args:
-        t: the step.
+        t: transition.
         clocks: result of `held` for it.
     """
     dt = (t.after.time - t.before.time)[..., None]

@@ -1,6 +1,6 @@
-"""Rewards: measures of a step that scenarios share; touches, lifts and possession too.
+"""Rewards: measures of a transition, with those of touches, lifts and possession.
 
-All functions are pure and vectorised over whatever leading axes the caller has.
+All functions are pure and vectorised over the caller's leading axes.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from marl_airhockey.types import Array
 
 
 def tolerance(value: Array, bound: float, margin: float) -> Array:
-    """1 where ``value`` is at most ``bound``, falling smoothly to e^-1 at ``margin``.
+    """Return 1 where ``value`` is at most ``bound``, falling to e^-1 at ``margin``.
 
-    The one shape for "close is good" (after the function of that name in dm_control).
+    The fall is smooth; the function follows dm_control's of the same name.
 
     Args:
-        value: (...) a distance or an error, not negative.
-        bound: up to here it is perfect.
-        margin: how far beyond the bound the value has fallen to e^-1.
+        value: distance or error (...), not negative.
+        bound: largest value with the result 1.
+        margin: excess over the bound with the result e^-1.
     """
     return np.exp(-np.maximum(value - bound, 0.0) / margin)
 
@@ -39,8 +39,8 @@ def tolerance(value: Array, bound: float, margin: float) -> Array:
 def nearest(t: Transition) -> Array:
     """(...) shortest distance of paddle 0 to puck 0 up to the first touch, m.
 
-    It goes on from ``gap`` of the memory. What it shrank by is the reward for going to
-    the puck; being a best so far, it cannot be farmed by going to and fro.
+    It continues ``gap`` of the memory. Its decrease rewards moving to the puck; as a
+    running minimum it cannot be exploited by moving back and forth.
     """
     gap, old = (
         length(t.after.puck[..., 0, :] - t.after.paddle[..., 0, :]),
@@ -50,7 +50,7 @@ def nearest(t: Transition) -> Array:
 
 
 def gained(old: Array, new: Array) -> Array:
-    """What a best distance shrank by; nothing as long as there was none (infinite)."""
+    """(...) decrease of a best distance; 0 while there was none (infinite)."""
     none = np.isinf(old)
     return np.where(none, 0.0, np.where(none, 0.0, old) - np.where(none, 0.0, new))
 
@@ -58,14 +58,14 @@ def gained(old: Array, new: Array) -> Array:
 def alike(
     velocity: Array, wanted: Array, angle: float, share: float, slack: float
 ) -> Array:
-    """(...) bool: two velocities agree in direction and speed.
+    """(...) bool: True where two velocities agree in direction and speed.
 
     Args:
         velocity: (..., 2) m/s.
         wanted: (..., 2) m/s.
         angle: largest angle between them, rad.
         share: largest error of the speed, as a share of the wanted speed.
-        slack: this much more, m/s.
+        slack: further error of the speed, m/s.
     """
     speed, aim = length(velocity), length(wanted)
     along = (velocity * wanted).sum(-1) >= np.cos(angle) * speed * aim
@@ -82,23 +82,23 @@ def enters(
     speed_share: float = 0.0,
     speed_slack: float = 0.0,
 ) -> tuple[Array, Array, Array]:
-    """Judge the path of puck 0 against a circle, at every substep after a touch.
+    """Compare the path of puck 0 with a circle, at every substep after a touch.
 
-    Only moments count at which the puck has been touched and rises (moves away from
+    Only substeps count at which the puck has been touched and rises (moves away from
     home).
 
     Args:
-        t: the step; the state after it has a ``path`` (..., K + 1, movers, 4).
+        t: transition; the state after it has a ``path`` (..., K + 1, movers, 4).
         centre: (..., 2) of the circle, m.
         radius: of the circle, m.
         velocity: (..., 2) wanted velocity in the circle, m/s; None for any.
         angle: largest angle to the wanted velocity, rad.
         speed_share: largest error of the speed, as a share of the wanted speed.
-        speed_slack: this much more, m/s.
+        speed_slack: further error of the speed, m/s.
 
     Returns:
         ``entered`` (...) bool; ``gap`` (..., K + 1) to the circle's edge in m, infinite
-        where a moment does not count; ``error`` (..., K + 1) of the velocity, m/s.
+        where a substep does not count; ``error`` (..., K + 1) of the velocity, m/s.
 
     Raises:
         ValueError: a state without a path.

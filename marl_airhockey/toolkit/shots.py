@@ -1,4 +1,4 @@
-"""Goals that can be met: moments of legal shots at a falling puck."""
+"""Shots: feasible goals, drawn from legal shots at a falling puck."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from marl_airhockey.types import Array
 
 SECONDS = np.arange(0.0, 2.5, 0.005)
 TRIES = 20
-"""Shots tried at a puck before another puck is drawn."""
+"""Number of shots tried at a puck before another puck is drawn."""
 
 
 def legal_shots(rng: RandomStreams, scene: Scene) -> tuple[Array, Array]:
-    """Draw falling pucks and for each a moment of a shot that a robot seat can play.
+    """Draw falling pucks, and for each a goal on a shot that a robot seat can play.
 
     The puck falls to x in -0.65 .. -0.30 and is struck there with a contact normal
     within 0.5 rad of straight up and a normal paddle speed of 0 .. 0.6 m/s, the
-    paddle's centre lying in x -0.74 .. -0.38 and |y| <= 0.24; it rolls on with banks.
-    The moment is a random one of that path with x 0.05 .. 0.738, |y| < 0.205, within
+    paddle's centre lying in x -0.74 .. -0.38 and |y| <= 0.24; it slides on with banks.
+    The goal is a random point of that path with x 0.05 .. 0.738, |y| < 0.205, within
     30 deg of straight up and vx at least 0.5 m/s.
 
     Returns:
-        (W, 4) x, y, vx, vy of the puck at its start, and (W, 4) of the moment.
+        (W, 4) x, y, vx, vy of the puck at its start, and (W, 4) of the goal.
 
     Raises:
         RuntimeError: no shot was found in 100 pucks.
@@ -48,12 +48,12 @@ def legal_shots(rng: RandomStreams, scene: Scene) -> tuple[Array, Array]:
 
 
 def shots_at(rng: RandomStreams, scene: Scene, state: State) -> Array:
-    """Draw for each puck 0 of a state a moment of a legal shot at it, as `legal_shots`.
+    """Draw a goal on a legal shot (see `legal_shots`) at puck 0 of each world.
 
-    A puck at which none was found in 100 tries gets a moment of a shot at another one.
+    If none is found in 100 tries, the goal is one of a shot at another puck.
 
     Returns:
-        (W, 4) x, y, vx, vy of the moment.
+        (W, 4) x, y, vx, vy of the goal.
     """
     _, goals = legal_shots(rng, scene)
     pucks = np.concatenate([state.puck[:, 0], state.puck_velocity[:, 0]], -1)
@@ -66,7 +66,7 @@ def shots_at(rng: RandomStreams, scene: Scene, state: State) -> Array:
 
 
 def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]:
-    """Shoot once at each puck: a random goal moment (W, 4), and if there is one."""
+    """Shoot once at each puck; return a random goal (W, 4), and if there is one."""
     table, physics = scene.table, {k: p.default for k, p in PARAMETERS.items()}
     physics.update(scene.defaults)
     ways = (
@@ -98,11 +98,11 @@ def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]
 
 @njit(cache=True)
 def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
-    """Pick a good moment of each path (W, T, 4) while it rises; -1 if there is none."""
+    """Choose a valid index of each rising path (W, T, 4); -1 if there is none."""
     steep = np.tan(np.radians(30.0))
     for w in range(len(path)):
         good, moment[w] = 0, -1
-        # Twice: the first time to count the good moments, the second to take one.
+        # Two passes: the first counts the valid indices, the second chooses one.
         for take in range(2):
             wanted, count = int(choice[w] * good) if take else -1, 0
             for t in range(path.shape[1]):

@@ -1,4 +1,4 @@
-"""Samplers of first states that scenarios share."""
+"""Samplers of initial states that scenarios share."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)
 PADDLE_Y = (-0.10, 0.10)
-"""m: where a single paddle starts unless its scenario says otherwise."""
+"""Range of y at which a single paddle starts unless its scenario sets it (m)."""
 
 
 def uniform_box(
     rng: RandomStreams, x: tuple[float, float], y: tuple[float, float]
 ) -> Array:
-    """(W, 2) points uniform in a box of the standard table, m."""
+    """(W, 2) uniform points in a box of the standard table, m."""
     low, high = _corners(x, y)
     return rng.uniform(low, high, 2)
 
@@ -34,14 +34,17 @@ def _corners(x: tuple[float, float], y: tuple[float, float]) -> tuple[Array, Arr
 
 
 def falling_puck(rng: RandomStreams) -> tuple[Array, Array]:
-    """A puck on its way down from the far half: (W, 2) position and velocity."""
+    """Draw position and velocity (W, 2) of a puck that falls from the far half."""
     position = uniform_box(rng, (0.4, 0.8), (-0.2, 0.2))
     velocity = uniform_box(rng, (-1.0, -0.2), (-0.3, 0.3))
     return position, velocity
 
 
 def falling(rng: RandomStreams, scene: Scene) -> State:
-    """One paddle at home and every puck falling from the far half, none on another."""
+    """Draw states with one paddle at home and pucks that fall from the far half.
+
+    No puck overlaps another.
+    """
     state = scene.still_state(len(rng))
     state.position[:, 0] = uniform_box(rng, PADDLE_X, PADDLE_Y)
     first = scene.bodies.puck.start
@@ -67,16 +70,17 @@ def serve(
     heading: Array,
     rows: Array | None = None,
 ) -> None:
-    """Put a puck to the centre, on its way at 0.5 m/s within 0.3 rad of a heading.
+    """Place a puck at the centre, moving at 0.5 m/s within 0.3 rad of a heading.
 
-    In place; paddles stay where they are. Several pucks have places beside each other.
+    The state is changed in place, but for its paddles. Several pucks are placed beside
+    each other.
 
     Args:
-        rng: one stream a row.
+        rng: one stream per row.
         state: rows (W,).
-        puck: which.
+        puck: its index.
         heading: (W,) or (), rad in the table frame.
-        rows: (W,) bool: which rows are served; None for all.
+        rows: (W,) bool: True for the rows to serve; None for all.
     """
     angle = heading + rng.uniform(-0.3, 0.3)
     place = np.array([0.0, 0.12 * (puck - 0.5 * (state.bodies.pucks - 1))])
@@ -101,10 +105,10 @@ def roll(
     half_width: float,
     restitution: float,
 ) -> Array:
-    """Closed form of a puck that slides, falls and banks off the long walls.
+    """Compute, in closed form, a puck that slides, falls and banks off the long walls.
 
-    With drag c the lateral way after time t is that of a free puck after
-    u = (1 - exp(-c t)) / c, so that banks come at known u.
+    With drag c the lateral distance after time t is that of a puck without drag after
+    u = (1 - exp(-c t)) / c, so that banks happen at known u.
 
     Args:
         position: (W, 2) m.
@@ -113,7 +117,7 @@ def roll(
         pull: acceleration toward home, m/s2.
         damping: drag c, 1/s, above 0.
         half_width: largest |y| of the puck's centre, m.
-        restitution: of the walls.
+        restitution: restitution of the walls.
 
     Returns:
         (W, T, 4) x, y, vx, vy.
@@ -155,7 +159,7 @@ def _roll(
 
 
 def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> Array:
-    """(W, 2) points in a seat's reach, ``margin`` m from its edges, table frame."""
+    """(W, 2) points in a seat's reach, ``margin`` m from its edges, table frame, m."""
     polygon = np.asarray(scene.seats[seat].reach)
     normals, offsets = half_planes(scene.seats[seat].reach)
     low, high = polygon.min(0) + margin, polygon.max(0) - margin
@@ -175,10 +179,10 @@ def redraw(
     sample: Callable[[RandomStreams], Array],
     accept: Callable[[Array], Array],
 ) -> Array:
-    """Rows of ``sample``, each drawn again until ``accept`` takes it.
+    """Draw rows by ``sample``, each again until ``accept`` is True for it.
 
     Raises:
-        RuntimeError: a row that is still refused after 1000 tries.
+        RuntimeError: a row that is not accepted in 1000 tries.
     """
     rows = sample(rng)
     for _ in range(1000):

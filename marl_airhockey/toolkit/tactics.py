@@ -1,6 +1,6 @@
-"""What scripted players of games share: foresight, aiming, and how good they are.
+"""Tactics of scripted players of games: prediction, aiming and playing strength.
 
-Everything is in the ego frame of a seat, over W worlds.
+All arrays are in the ego frame of a seat, over W worlds.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from marl_airhockey.types import Array
 
 
 class Skill(NamedTuple):
-    """How good a script is."""
+    """Skill of a scripted player."""
 
     pace: float
-    """Largest share of its top speed that it asks for."""
+    """Largest share of the top speed that it commands"""
     lag: float
-    """s by which it sees pucks late, as if they had moved on evenly."""
+    """Age of the pucks that it sees, extrapolated backwards at constant velocity (s)"""
 
 
 STRENGTHS = {
@@ -32,18 +32,19 @@ STRENGTHS = {
     "fair": Skill(0.55, 0.06),
     "strong": Skill(1.0, 0.0),
 }
+"""Skills by name."""
 
 
 @dataclass
 class Scripted(Driver):
-    """A scripted player of games, as good as its strength.
+    """Scripted player of games with a selectable strength.
 
     Raises:
         ValueError: an unknown strength.
     """
 
     strength: str = "strong"
-    """In games: "weak", "fair" or "strong"."""
+    """Strength in games: "weak", "fair" or "strong"."""
 
     def __post_init__(self) -> None:
         if self.strength not in STRENGTHS:
@@ -51,7 +52,7 @@ class Scripted(Driver):
         self._skill = STRENGTHS[self.strength]
 
     def _paced(self, action: Array, view: View) -> Array:
-        """(W, 2) asked m/s as fractions of top speed, none above its pace."""
+        """(W, 2) fractions of top speed of velocities (m/s), at most its pace."""
         share = action / view.top_speed[:, None]
         most = self._skill.pace / np.maximum(length(share), 1e-9)
         return share * np.minimum(most, 1.0)[:, None]
@@ -59,20 +60,20 @@ class Scripted(Driver):
 
 @dataclass(frozen=True)
 class Field:
-    """Where the goals are in the ego frame of a seat."""
+    """Field of a game in the ego frame of a seat: its edges and goals."""
 
     edge: float
-    """x of one's own side, m."""
+    """Coordinate x of the own side (m)."""
     half: float
-    """Half the width of the table for a puck's centre, m; infinite on polygons."""
+    """Half the width of the table for a puck's centre (m); infinite on polygons."""
     keep: float
-    """Largest |y| of a shot at one's own goal, m."""
+    """Largest |y| of a shot at the own goal (m)."""
     targets: Array
-    """(T, 2) points in the goals of other teams, m; empty without any."""
+    """Points in the goals of other teams (T, 2), m; empty without any."""
 
     @staticmethod
     def of(scene: Scene, seat: int) -> Field:
-        """As a seat sees it."""
+        """Return the field of a seat."""
         table, me = scene.table, scene.seats[seat]
         rotation = table.rotation(me.side)
         teams = {s.side: s.team for s in scene.seats}
@@ -94,7 +95,7 @@ class Field:
         return Field(-float(table.offsets[me.side]), half, keep, targets)
 
     def fold(self, y: Array) -> Array:
-        """Where a puck is that would be at ``y`` without the long walls, m."""
+        """Reflect ``y`` (m) of a puck that would pass the long walls."""
         if not np.isfinite(self.half):
             return y
         wide = 4 * self.half
@@ -102,7 +103,7 @@ class Field:
 
 
 def nearest_puck(view: View, lag: float) -> tuple[Array, Array]:
-    """Place and velocity of the puck to see to: it is near, or soon will be."""
+    """Return position and velocity (W, 2) of the puck that is, or will be, nearest."""
     place = view.state.puck - lag * view.state.puck_velocity
     motion = view.state.puck_velocity
     which = (place[..., 0] + 0.4 * motion[..., 0]).argmin(-1)
@@ -111,13 +112,13 @@ def nearest_puck(view: View, lag: float) -> tuple[Array, Array]:
 
 
 def guard(view: View, field: Field, depth: float, lag: float) -> Array:
-    """(W, 2) where to stand: on a line before the goal, where the puck will cross it.
+    """(W, 2) points on a line before the goal, where the puck will cross it, m.
 
     Args:
-        view: what is seen.
+        view: view of the seat.
         field: see `Field`.
-        depth: m of the line from the near edge of the reach.
-        lag: s by which pucks are seen late.
+        depth: distance of the line from the near edge of the reach, m.
+        lag: age of the pucks that are seen, s.
     """
     line = view.reach[:, 0].min() + depth
     place, motion = nearest_puck(view, lag)
@@ -128,12 +129,12 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
     return np.stack([np.full_like(aside, line), np.clip(aside, -wide, wide)], -1)
 
 
-LOOK, FURTHEST = 0.05, 1.2
-"""s: a puck's way is looked at in such steps, so far ahead."""
+STEP, HORIZON = 0.05, 1.2
+"""Time step and horizon of the prediction of a puck's path (s)."""
 
 
 @njit(cache=True, error_model="numpy")
-def _meeting(
+def _find_strike(
     place: Array,
     motion: Array,
     own: Array,
@@ -144,14 +145,16 @@ def _meeting(
     touch: float,
     half: float,
 ) -> tuple[Array, Array, Array]:
-    """When and where a paddle can first be behind a puck, and the way from there.
+    """Find when and where a paddle can first be behind a puck, and the direction then.
 
-    All (W, ...); the time is infinite where it never can, the place then is the puck's.
+    Returns:
+        Time (W,), s, infinite if never; position of the puck then (W, 2), m, its
+        present one if never; unit vector from there to the aim (W, 2).
     """
     due, there, way = np.empty(len(own)), np.empty_like(own), np.empty_like(own)
     for w in range(len(own)):
         due[w] = np.inf
-        for moment in np.arange(0.0, FURTHEST + 0.5 * LOOK, LOOK):
+        for moment in np.arange(0.0, HORIZON + 0.5 * STEP, STEP):
             x = place[w, 0] + motion[w, 0] * moment
             y = place[w, 1] + motion[w, 1] * moment
             if np.isfinite(half):
@@ -161,8 +164,8 @@ def _meeting(
             ox, oy = ox / size, oy / size
             bx = min(max(x - ox * (touch + 0.03), low[0]), high[0]) - own[w, 0]
             by = min(max(y - oy * (touch + 0.03), low[1]), high[1]) - own[w, 1]
-            require = np.sqrt(bx * bx + by * by) / max(speed[w], 1e-6)
-            fits = low[0] < x < high[0] + 0.7 * touch and require <= moment + LOOK
+            needed = np.sqrt(bx * bx + by * by) / max(speed[w], 1e-6)
+            fits = low[0] < x < high[0] + 0.7 * touch and needed <= moment + STEP
             if fits or moment == 0.0:
                 there[w, 0], there[w, 1], way[w, 0], way[w, 1] = x, y, ox, oy
             if fits:
@@ -174,19 +177,21 @@ def _meeting(
 def attack(
     view: View, field: Field, aim: Array, pace: float, lag: float
 ) -> tuple[Array, Array]:
-    """Velocities (W, 2) m/s that strike the puck at a point, and in how many s (W,).
+    """Compute velocities that strike the puck at a point.
 
-    The time is infinite where the puck cannot be met.
-
-    The puck is met at the first moment at which the paddle can be behind it; until then
-    the paddle waits a little behind, and strikes through the puck when it is due.
+    The puck is struck at the first time at which the paddle can be behind it; until
+    then the paddle waits a little behind, and strikes through the puck when it is due.
 
     Args:
-        view: what is seen.
+        view: view of the seat.
         field: see `Field`.
         aim: (W, 2) m.
         pace: largest share of top speed.
-        lag: s by which pucks are seen late.
+        lag: age of the pucks that are seen, s.
+
+    Returns:
+        Velocities (W, 2), m/s, and times to the strike (W,), s, infinite where the puck
+        cannot be struck.
     """
     own, speed = view.state.paddle[:, view.seat], pace * view.top_speed
     place, motion = nearest_puck(view, lag)
@@ -194,7 +199,7 @@ def attack(
     touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
     low, high = view.reach.min(0), view.reach.max(0)
 
-    due, there, way = _meeting(
+    due, there, way = _find_strike(
         place, motion, own, speed, aim, low, high, touch, field.half
     )
     contact = there - way * touch
@@ -205,7 +210,7 @@ def attack(
     ready = (along > -0.01) & (along < 0.2) & (length(aside) < 0.02)
     strike = np.where(rest, ready, (due < 0.11) & (length(aside) < 0.06))
     through = way * speed[:, None] + aside * 12.0
-    # Around the puck, not through it, when it lies nearer to home than the paddle.
+    # Around the puck, not through it, when it is nearer to home than the paddle.
     wrong = (own[:, 0] > there[:, 0] - 0.3 * touch) & (due < 0.25)
     room = np.where(own[:, 1] >= there[:, 1], 1.0, -1.0) * touch * 1.25
     detour = np.stack([there[:, 0] - 1.2 * touch, there[:, 1] + room], -1)
@@ -215,7 +220,7 @@ def attack(
 
 
 def open_goal(view: View, field: Field) -> Array:
-    """(W, 2) the point in the other goals that fewest paddles are in the way of, m."""
+    """(W, 2) point in the other goals whose shot passes farthest from paddles, m."""
     if not len(field.targets):
         return np.broadcast_to(np.array([-field.edge, 0.0]), (len(view.rng), 2))
     place, _ = nearest_puck(view, 0.0)

@@ -1,4 +1,4 @@
-"""What games of two teams with a goal at either end share: score, serves and fouls."""
+"""Versus: base of games of two teams with a goal at either end."""
 
 from __future__ import annotations
 
@@ -19,29 +19,30 @@ from marl_airhockey.types import Array, Memory
 
 @dataclass(frozen=True, kw_only=True)
 class Versus(Scenario):
-    """A goal pays a team 1 and costs the other 1; ``goals_to_win`` of them win.
+    """Game in which a goal pays a team 1 and costs the other 1.
 
-    After a goal the puck is served from the centre toward the team that conceded it.
-    Holding it within reach for ``possession`` seconds is a foul: a serve to the other
-    side. A puck that lies out of everybody's reach is served again.
+    The first team with ``goals_to_win`` goals wins. After a goal the puck is served
+    from the centre toward the team that conceded it. Keeping it within reach for
+    ``possession`` seconds is a foul: a serve to the other side. A puck at rest out of
+    every reach is served again.
     """
 
     seats: str = "arcade"
     seconds: float = 60.0
     goals_to_win: int = 7
-    """Goals."""
+    """Number of goals that wins."""
     pucks: int = 1
-    """Pucks in play at once."""
+    """Number of pucks in play."""
     goal_width: float = 0.30
-    """m: width of the goal lines."""
+    """Width of the goal lines (m)."""
     possession: float = 5.0
-    """s: for so long a team may have a puck in its reach."""
+    """Longest time that a team may have a puck in its reach (s)."""
     jitter_weight: float = 0.0
 
     @property
     @abstractmethod
     def lineup(self) -> tuple[tuple[int, float], ...]:
-        """Of each seat: the side it plays at, 0 or 2, and the y where it starts, m."""
+        """Side, 0 or 2, and y at the start (m) of each seat."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -60,7 +61,7 @@ class Versus(Scenario):
 
     @cached_property
     def teams(self) -> Array:
-        """(seats,) 0 at home, 1 at the far end."""
+        """Team of each seat (seats,): 0 at home, 1 at the far end."""
         return np.array([seat.team for seat in self.scene.seats])
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:

@@ -1,1 +1,1 @@
-"""Laws of the 2D table that its backends share."""
+"""Laws of the 2D table that the 2D backends share."""

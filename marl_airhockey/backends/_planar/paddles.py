@@ -1,4 +1,4 @@
-"""Paddles: how they follow their commands and meet, one law for every 2D backend."""
+"""Paddles of 2D backends: tracking of commands, and contacts between paddles."""
 
 from __future__ import annotations
 
@@ -19,18 +19,19 @@ def follow(
     imposed: Array,
     lifted: Array,
 ) -> None:
-    """Find how fast paddles go, which of them are prescribed, and which are lifted.
+    """Compute the velocities of paddles, and which are prescribed or lifted.
 
     Args:
         velocity: (B, paddles, 2) commanded, m/s.
         prescribed: (B, paddles, 4) position and velocity at the end of the step, nan
             for paddles that follow their command.
         position: (B, N, 2) m, paddles first.
-        dt: of the step, s.
-        goal: (B, paddles, 2) m/s, filled; a prescribed paddle has it all along.
-        imposed: (B, paddles) bool, filled: is prescribed.
-        lifted: (B, paddles) bool, filled: would be faster than any hand, so it is
-            carried above the table.
+        dt: length of the step, s.
+        goal: (B, paddles, 2) m/s at the end of the step, filled; that of a prescribed
+            paddle holds during the whole step.
+        imposed: (B, paddles) bool, filled: True if prescribed.
+        lifted: (B, paddles) bool, filled: True if faster than `MAX_PRESCRIBED_SPEED`,
+            so that it moves above the table.
     """
     for b in range(len(goal)):
         for i in range(goal.shape[1]):
@@ -58,18 +59,21 @@ def ramp_paddles(
     diameter: float,
     mean: Array,
 ) -> bool:
-    """Move paddles by a substep of their linear ramps, in place; True if any met.
+    """Move paddles by a substep of their linear ramps, in place.
 
     Args:
         position: (paddles, 2) m.
         velocity: (paddles, 2) m/s.
-        goal: (paddles, 2) m/s after the ``left`` substeps to come.
-        prescribed: (paddles,) bool: moves at its goal all along and does not yield.
+        goal: (paddles, 2) m/s after the ``left`` remaining substeps.
+        prescribed: (paddles,) bool: moves at its goal velocity and does not yield.
         lifted: (paddles,) bool: touches nothing.
-        left: substeps in what is left of the ramp.
-        dt: of a substep, s.
+        left: number of remaining substeps of the ramp.
+        dt: length of a substep, s.
         diameter: distance of two centres in contact, m.
-        mean: (paddles, 2) m/s, filled with how fast each goes within the substep.
+        mean: (paddles, 2) m/s, filled with the mean velocity within the substep.
+
+    Returns:
+        True if any pair overlapped.
     """
     for i in range(len(position)):
         for axis in range(2):
@@ -79,21 +83,21 @@ def ramp_paddles(
             mean[i, axis] = velocity[i, axis] + 0.5 * ramp
             position[i, axis] += mean[i, axis] * dt
             velocity[i, axis] += ramp
-    met = separate_paddles(position, velocity, prescribed, lifted, diameter)
-    if met:
+    overlap = separate_paddles(position, velocity, prescribed, lifted, diameter)
+    if overlap:
         mean[:] = velocity
-    return met
+    return overlap
 
 
 @njit(cache=True)
 def separate_paddles(
     position: Array, velocity: Array, prescribed: Array, lifted: Array, diameter: float
 ) -> bool:
-    """Separate overlapping paddles in place; True if any pair overlapped.
+    """Separate overlapping paddles in place; return True if any pair overlapped.
 
-    Each goes back by half of the overlap and both take the mean of their normal
-    velocities. A prescribed paddle does not yield: the other goes back by all of it
-    and takes the prescribed one's normal velocity.
+    Each is moved back by half of the overlap and both take the mean of their normal
+    velocities. A prescribed paddle does not yield: the other is moved back by all of
+    it and takes the prescribed one's normal velocity.
 
     Args:
         position: (paddles, 2) m, changed in place.
@@ -102,7 +106,7 @@ def separate_paddles(
         lifted: (paddles,) bool: touches nothing.
         diameter: distance of two centres in contact, m.
     """
-    met = False
+    overlap = False
     for i in range(len(prescribed) - 1):
         for j in range(i + 1, len(prescribed)):
             nx = position[j, 0] - position[i, 0]
@@ -112,7 +116,7 @@ def separate_paddles(
                 continue
             if lifted[i] or lifted[j]:
                 continue
-            met = True
+            overlap = True
             if distance > 1e-9:
                 nx, ny = nx / distance, ny / distance
             else:
@@ -134,4 +138,4 @@ def separate_paddles(
                 velocity[i, 1] += (common - vi) * ny
                 velocity[j, 0] += (common - vj) * nx
                 velocity[j, 1] += (common - vj) * ny
-    return met
+    return overlap

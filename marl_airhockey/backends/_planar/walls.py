@@ -1,4 +1,4 @@
-"""The lines that a puck's centre keeps inside of, and how a squeezed puck gets away."""
+"""Walls of 2D backends: their lines, and the release of squeezed pucks."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
 SQUEEZE = 0.002
-"""m: a puck that a paddle pushes deeper than this into a wall is set free."""
+"""Depth in a wall from which a puck that a paddle pushes is released (m)."""
 
 
 def sides(scene: Scene) -> Array:
-    """The sides of a scene's table, (sides, 6), as compiled code wants them.
+    """Return the sides of a scene's table (sides, 6), in the form for compiled code.
 
     A row holds the inward normal, the side's distance from the origin, its middle, and
     half the width of the goal line in it (0 for none), in metres.
@@ -31,7 +31,7 @@ def sides(scene: Scene) -> Array:
 
 @njit(cache=True)
 def wall(lines: Array, radius: float, x: float, y: float, depth: float) -> int:
-    """The side whose wall a puck is deeper in than ``depth``, m; -1 for none."""
+    """Return the side whose wall a puck is deeper in than ``depth`` (m); -1 if none."""
     for k in range(len(lines)):
         nx, ny = lines[k, 0], lines[k, 1]
         if nx * x + ny * y + lines[k, 2] - radius < -depth:
@@ -43,7 +43,7 @@ def wall(lines: Array, radius: float, x: float, y: float, depth: float) -> int:
 
 @njit(cache=True)
 def inside(lines: Array, radius: float, x: float, y: float) -> tuple[float, float]:
-    """The place taken out of the walls; twice, for a corner."""
+    """Move a point out of the walls; twice, for a corner."""
     for _ in range(2):
         k = wall(lines, radius, x, y, 0.0)
         if k >= 0:
@@ -57,18 +57,21 @@ def inside(lines: Array, radius: float, x: float, y: float) -> tuple[float, floa
 def slide_out(
     lines: Array, radius: float, x: float, y: float, paddles: Array, touch: float
 ) -> tuple[float, float]:
-    """Where a puck goes that paddles squeeze into a wall: away along it.
+    """Move a puck that paddles squeeze into a wall away along the wall.
 
     Neither wall nor paddle yields to a solver, which would push the puck into the
-    wall; in a corner the paddle is left to ride over it.
+    wall; in a corner the paddle is allowed to overlap it.
 
     Args:
-        lines: `sides`.
-        radius: of the puck, m.
-        x: of the puck, m.
-        y: of the puck, m.
-        paddles: (paddles, 2) m.
+        lines: result of `sides`.
+        radius: radius of the puck, m.
+        x: position of the puck, m.
+        y: position of the puck, m.
+        paddles: positions (paddles, 2), m.
         touch: distance of the centres of puck and paddle in contact, m.
+
+    Returns:
+        New position x, y of the puck, m.
     """
     k = wall(lines, radius, x, y, SQUEEZE)
     if k < 0:

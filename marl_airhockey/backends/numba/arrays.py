@@ -1,4 +1,4 @@
-"""Arrays that the kernel works on: table, commands, motion, events, coefficients."""
+"""Arrays of the kernel: table, commands, motion, events, coefficients."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from marl_airhockey.types import Array
 
 FALL, FADE, FLIGHT_FADE, FLIGHT_FALL, FLIGHT_DISTANCE, FLIGHT_DROP = range(6)
-WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, GRIP = range(6, 12)
+WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, FRICTION = range(6, 12)
 COEFFICIENTS = 12
 """Columns of a world's coefficients: speed that a substep takes from a puck's vx (m/s)
 and share of its speed that it leaves (1); the same for a whole step, and the distance
@@ -20,10 +20,10 @@ friction takes from a block in a substep (m/s)."""
 def make_coefficients(
     values: dict[str, Array], control_dt: float, substeps: int
 ) -> Array:
-    """Return (B, COEFFICIENTS) from physical parameters, (B,) each; pull in m/s2."""
+    """Return (B, COEFFICIENTS) from physical parameters (B,); `pull` in m/s2."""
     dt = control_dt / substeps
     fall, fade = values["pull"] * dt, np.exp(-values["puck_damping"] * dt)
-    # x and v are linear in the first v: the sums of substeps with v = 1 and v = 0.
+    # x and v are linear in the initial v: sum the substeps with v = 1 and v = 0.
     speed, drop = np.ones_like(fall), np.zeros_like(fall)
     distance, lost = np.zeros_like(fall), np.zeros_like(fall)
     for _ in range(substeps):
@@ -31,8 +31,8 @@ def make_coefficients(
         speed, drop = speed * fade, drop * fade - fall
     names = ("wall_restitution", "paddle_restitution", "block_restitution")
     rest = [values[n] for n in (*names, "puck_mass", "block_mass")]
-    grip = values["block_friction"] * dt
-    return np.stack([fall, fade, speed, drop, distance, lost, *rest, grip], axis=-1)
+    friction = values["block_friction"] * dt
+    return np.stack([fall, fade, speed, drop, distance, lost, *rest, friction], axis=-1)
 
 
 class Static(NamedTuple):
@@ -42,15 +42,15 @@ class Static(NamedTuple):
     pucks: int
     blocks: int
     radius: Array
-    """(N,) m"""
+    """Radii of the bodies (N,), m"""
     lines: Array
-    """`walls.sides`"""
+    """Result of `walls.sides`"""
     goal_lines: Array
-    """(M, 2) side of each goal line, and 1 if it is that whole side"""
+    """Side of each goal line, and 1 if it is that whole side (M, 2)"""
     obstacles: Array
-    """(O, 5) see `contacts.contact_obstacle`"""
+    """Obstacles (O, 5): see `contacts.contact_obstacle`"""
     control_dt: float
-    """s"""
+    """Length of a control step, s"""
     substeps: int
 
 
@@ -58,65 +58,67 @@ class Commands(NamedTuple):
     """Commands to the paddles of B worlds in a step."""
 
     goal: Array
-    """(B, paddles, 2) m/s at the end of the step; of a prescribed one, all along"""
+    """Velocity at the end of the step, or during all of it if prescribed
+    (B, paddles, 2), m/s"""
     prescribed: Array
-    """(B, paddles) moves at its velocity and does not yield"""
+    """True if the paddle moves at its velocity and does not yield (B, paddles)"""
     lifted: Array
-    """(B, paddles) touches nothing"""
+    """True if the paddle touches nothing (B, paddles)"""
     closed: Array
-    """(B, M) goal lines that are wall"""
+    """True if the goal line is wall (B, M)"""
 
 
 class Previous(NamedTuple):
-    """State that a step begins with, read-only."""
+    """State before the step, read-only."""
 
     position: Array
     """(B, N, 2) m"""
     velocity: Array
     """(B, N, 2) m/s"""
     touching: Array
-    """(B, paddles, pucks) see `State`"""
+    """True if in contact (B, paddles, pucks)"""
     time: Array
     """(B,) s"""
 
 
 class Motion(NamedTuple):
-    """Motion of all bodies, filled; `push` is kept from step to step."""
+    """Motion of all bodies, filled; `push` persists between steps."""
 
     position: Array
     """(B, N, 2) m"""
     velocity: Array
     """(B, N, 2) m/s"""
     path: Array
-    """(B, substeps + 1, movers, 4) x, y, vx, vy, or (B, 0, movers, 4) if not wanted"""
+    """Columns x, y, vx, vy (B, substeps + 1, movers, 4), or (B, 0, movers, 4) if the
+    scene does not require it"""
     push: Array
-    """(B, movers, 2) m: correction of overlaps that the next substep applies"""
+    """Correction of overlaps that the next substep applies (B, movers, 2), m"""
     time: Array
     """(B,) s"""
 
 
 class Events(NamedTuple):
-    """Events of pucks, filled; the last two are kept from step to step."""
+    """Events of pucks, filled; the last two persist between steps."""
 
     touched: Array
-    """(B, paddles, pucks) see `State`, as the next five"""
+    """Contacts (B, paddles, pucks); this and the next five as in `State`"""
     touched_at: Array
     touching: Array
     banked: Array
     crossed: Array
     crossed_velocity: Array
     against: Array
-    """(B, pucks, sides) bool: the puck touches the wall of that side"""
+    """True if the puck touches the wall of that side (B, pucks, sides)"""
     out: Array
-    """(B, pucks) bool: the puck is out of play"""
+    """True if the puck is out of play (B, pucks)"""
 
 
 class Batch(NamedTuple):
-    """B worlds: all arrays that the kernel works on."""
+    """Batch of B worlds: all arrays of the kernel."""
 
     static: Static
     coefficients: Array
-    """(B, LAWS)"""
+    """Coefficients of the laws (B, COEFFICIENTS)"""
     commands: Commands
     previous: Previous
     motion: Motion

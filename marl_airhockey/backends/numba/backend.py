@@ -24,7 +24,7 @@ from marl_airhockey.types import Array
 
 
 class NumbaBackend(Backend):
-    """B worlds as rows of arrays, stepped by a compiled `kernel.advance`."""
+    """Backend with B worlds as rows of arrays, stepped by compiled `kernel.advance`."""
 
     exact: ClassVar[bool] = True
     default_substeps: ClassVar[int] = 10

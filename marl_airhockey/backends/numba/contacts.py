@@ -1,9 +1,9 @@
 """Contacts of discs with walls, goal lines, obstacles and each other.
 
-The laws are Chipmunk's, written for discs: positions move first, a contact sees the
+The laws are Chipmunk's, written for discs: positions move first, a contact uses the
 velocity from before the pull of the slope, and corrects an overlap in the next substep.
-Functions of plain numbers, so that a compiler keeps them in registers: metres, m/s. A
-contact is its depth (above 0 if they touch) and its unit normal.
+The functions take scalars (m, m/s), which a compiler keeps in registers. A contact is
+its depth (above 0 if they touch) and its unit normal.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numba import njit
 from marl_airhockey.types import Array
 
 SLOP = 1e-4
-"""m: overlap that a contact keeps, so that what rests stays in contact."""
+"""Overlap that a contact keeps, so that resting bodies stay in contact (m)."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -22,8 +22,8 @@ def bounce(before: float, now: float, restitution: float) -> float:
     """Return the normal speed that a contact adds, m/s.
 
     Args:
-        before: normal speed before this substep's forces; below 0 if closing.
-        now: the same after them.
+        before: normal speed before this substep's forces, m/s; below 0 if closing.
+        now: normal speed after them, m/s.
         restitution: share of the closing speed that is returned.
     """
     return max(-(restitution * before + now), 0.0)
@@ -60,7 +60,7 @@ def contact_side(
     aside = nx * (y - lines[s, 4]) - ny * (x - lines[s, 3])
     if abs(aside) >= half:
         return radius - ahead, nx, ny
-    # In the goal line: its nearer post or, behind the line, the wall beside it.
+    # Within the goal line: its nearer post or, behind the line, the wall beside it.
     gap = aside - (half if aside >= 0.0 else -half)
     depth, along, across = contact_disc(gap, max(ahead, 0.0), radius)
     return depth, across * nx - along * ny, across * ny + along * nx
@@ -68,7 +68,7 @@ def contact_side(
 
 @njit(cache=True, error_model="numpy")
 def passes_line(x: float, y: float, lines: Array, s: int) -> bool:
-    """Tell whether a centre has passed the goal line in side ``s`` of `walls.sides`."""
+    """Return True if a centre has passed the goal line in side ``s``."""
     nx, ny = lines[s, 0], lines[s, 1]
     aside = nx * (y - lines[s, 4]) - ny * (x - lines[s, 3])
     return bool(nx * x + ny * y + lines[s, 2] < 0.0 and abs(aside) < lines[s, 5])

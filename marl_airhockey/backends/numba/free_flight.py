@@ -1,4 +1,4 @@
-"""Free flight: worlds without a contact in a control step, and their closed form."""
+"""Free flight: closed form of worlds without a contact in a control step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from marl_airhockey.backends.numba.arrays import (
     FLIGHT_DROP,
     FLIGHT_FADE,
     FLIGHT_FALL,
-    GRIP,
+    FRICTION,
     Batch,
 )
 from marl_airhockey.backends.numba.contacts import contact_obstacle
@@ -20,9 +20,9 @@ from marl_airhockey.types import Array
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def carry_over(batch: Batch) -> None:
-    """Fill the result with the state before the step, and no event."""
+    """Fill the result with the state before the step and no events."""
     previous, motion, events = batch.previous, batch.motion, batch.events
-    # Loops: for few worlds, numba's copies of whole arrays cost more than what they do.
+    # Loops: for few worlds, numba's copies of whole arrays are slower.
     worlds, bodies, _ = motion.position.shape
     _, paddles, pucks = events.touched.shape
     goal_lines, sides = events.crossed.shape[2], events.banked.shape[2]
@@ -49,18 +49,18 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
     """Mark the worlds in which a body may touch anything within the step.
 
     A ramp is a parabola, which lies between its control points; drag keeps a puck on
-    the path of free flight. So a body comes no nearer to a thing than the best of these
-    points, seen along the line to it at the beginning, and the distance of its fall.
+    the path of free flight. So a body comes no nearer to an object than the nearest of
+    these points, projected on the initial line to it, less the distance of its fall.
     """
     static, coefficients, commands, _, motion, events = batch
     paddles, pucks, blocks, radius, lines, _, obstacles, control_dt, n = static
     position, velocity, push = motion.position, motion.velocity, motion.push
     goal, out = commands.goal, events.out
     first, movers = paddles + pucks, paddles + pucks + blocks
-    # Where the control points of each body lie, from its place.
+    # Control points of each body relative to its position.
     early, late = np.zeros((movers, 2)), np.zeros((movers, 2))
     for b in range(len(coefficients)):
-        met, drop = False, coefficients[b, FALL] * n * control_dt
+        near, drop = False, coefficients[b, FALL] * n * control_dt
         for i in range(movers):
             vx, vy = velocity[b, i, 0], velocity[b, i, 1]
             if i < paddles:
@@ -74,25 +74,25 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
                 early[i, 0], early[i, 1] = vx * control_dt, vy * control_dt
                 late[i, 0], late[i, 1] = early[i, 0], early[i, 1]
             else:
-                met |= (
+                near |= (
                     vx != 0.0
                     or vy != 0.0
-                    or coefficients[b, FALL] > coefficients[b, GRIP]
+                    or coefficients[b, FALL] > coefficients[b, FRICTION]
                 )
-                met |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
+                near |= push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0
         for i in range(paddles, first):
-            # A puck out of play meets nothing.
+            # A puck out of play touches nothing.
             if out[b, i - paddles]:
                 continue
             x, y, size = position[b, i, 0], position[b, i, 1], radius[i] + drop
             for s in range(len(lines)):
                 nx, ny = lines[s, 0], lines[s, 1]
                 nearing = max(-(nx * late[i, 0] + ny * late[i, 1]), 0.0)
-                met |= nx * x + ny * y + lines[s, 2] < size + nearing
+                near |= nx * x + ny * y + lines[s, 2] < size + nearing
             if len(obstacles) > 0:
                 distance = np.sqrt(late[i, 0] ** 2 + late[i, 1] ** 2)
                 for o in range(len(obstacles)):
-                    met |= (
+                    near |= (
                         contact_obstacle(x, y, size + distance, obstacles, o)[0] > 0.0
                     )
         for i in range(first):
@@ -109,8 +109,8 @@ def find_collisions(batch: Batch, may_collide: Array) -> None:
                 other = max(-(dx * early[j, 0] + dy * early[j, 1]), 0.0)
                 other = max(other, -(dx * late[j, 0] + dy * late[j, 1]))
                 reach, left = radius[i] + radius[j] + drop, gap - mine - other
-                met |= left <= 0.0 or left * left < reach * reach * gap
-        may_collide[b] = met
+                near |= left <= 0.0 or left * left < reach * reach * gap
+        may_collide[b] = near
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

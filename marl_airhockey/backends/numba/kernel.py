@@ -1,8 +1,8 @@
 """Kernel of the 2D table: one control step of B worlds in one compiled loop.
 
-A world without a contact in the step flies through it in closed form; any other is
-stepped substep by substep by the laws of `contacts`. Both give the same numbers
-but for rounding, so that most steps cost a few distances.
+A world without a contact in the step is advanced in closed form; any other one substep
+by substep by the laws of `contacts`. Both give the same numbers but for rounding, so
+that most steps cost only a few distances.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from marl_airhockey.backends.numba.arrays import (
     BLOCK_MASS,
     FADE,
     FALL,
-    GRIP,
+    FRICTION,
     PADDLE,
     PUCK_MASS,
     WALL,
@@ -86,9 +86,9 @@ def advance(
 ) -> None:
     """Move B worlds by a control step, in place.
 
-    Takes the arrays of a `Batch` one by one: numba is slow to take tuples of arrays
-    from Python, and Python to make them. ``command``, ``prescribed`` and ``closed`` are
-    those of a `contracts.backend.Command`; the next three are filled.
+    The arrays of a `Batch` are single arguments: numba is slow to unbox tuples of
+    arrays from Python, and Python to build them. ``command``, ``prescribed`` and
+    ``closed`` are those of a `contracts.backend.Command`; the next three are filled.
     """
     static = Static(
         *(paddles, pucks, blocks, radius, lines, goal_lines, obstacles),
@@ -123,8 +123,8 @@ def advance(
 def _substeps(batch: Batch, may_collide: Array) -> None:
     """Move the worlds that may have contacts, substep by substep.
 
-    The inner functions are one phase of a substep each; numba puts them in place, which
-    spares it counting references to a dozen arrays at every call.
+    Each inner function is one phase of a substep; numba inlines them, which saves the
+    reference counts of a dozen arrays at every call.
     """
     static, coefficients, commands, _, motion, events = batch
     paddles, pucks, blocks, radius, shared, goal_lines, obstacles = static[:7]
@@ -135,16 +135,16 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
     touched, touched_at, touching, banked = events[:4]
     crossed, crossed_velocity, against, out = events[4:]
     first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
-    # Of one world: positions, velocities, those before this substep's forces,
-    # corrections of overlaps; ramped is a paddle's velocity by now.
+    # Arrays of one world: positions, velocities, those before this substep's forces,
+    # corrections of overlaps; `ramped` is a paddle's velocity so far.
     p, v = np.zeros((movers, 2)), np.zeros((movers, 2))
     was, push = np.zeros((movers, 2)), np.zeros((movers, 2))
     ramped = np.zeros((paddles, 2))
     weight, spring = np.zeros(movers), np.ones(movers)
     away, awake = np.zeros(movers, np.bool_), np.zeros(movers, np.bool_)
-    # What can meet in what is left of the step: bodies and fixed things, bodies and
-    # bodies, and whether any paddles can. Listed anew after every contact, which may
-    # make something faster.
+    # Pairs that can touch in the rest of the step: bodies and fixed objects, bodies and
+    # bodies, and a flag for paddles. Listed again after every contact, which may make
+    # a body faster.
     hard = np.zeros((movers * (len(lines) + len(obstacles)), 2), np.int64)
     soft = np.zeros((movers * movers, 2), np.int64)
     reach, fresh_bank = np.zeros(movers), np.zeros((pucks, len(lines)), np.bool_)
@@ -167,7 +167,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
             elif i < first:
                 weight[i] = 1.0 / coefficients[b, PUCK_MASS]
                 away[i] = out[b, i - paddles]
-                # Half a substep ahead of what is reported (leapfrog).
+                # Half a substep ahead of the reported velocity (leapfrog).
                 v[i, 0] -= leapfrog_offset
             else:
                 weight[i] = 1.0 / coefficients[b, BLOCK_MASS]
@@ -183,7 +183,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
             reach[i] = radius[i] + shift
             reach[i] += (np.sqrt(most) + left * coefficients[b, FALL]) * left * dt
             awake[i] = i < first or most > 0.0 or shift > 0.0
-            awake[i] |= coefficients[b, FALL] > coefficients[b, GRIP]
+            awake[i] |= coefficients[b, FALL] > coefficients[b, FRICTION]
         hards[0] = softs[0] = 0
         fresh[0], crowd[0] = True, False
         for i in range(movers):
@@ -270,7 +270,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
             for k in range(pucks):
                 i = paddles + k
                 if whole:
-                    # Crossed by touching the wall, as `meet_fixed` has found.
+                    # Crossed by touching the wall, as found for its wall.
                     passed = fresh_bank[k, s]
                 else:
                     passed = not away[i] and passes_line(p[i, 0], p[i, 1], lines, s)
@@ -289,11 +289,11 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
                 dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
                 depth, nx, ny = contact_disc(dx, dy, radius[i] + radius[j])
             if i < paddles and j < first:
-                k, meets = j - paddles, depth > 0.0
-                if meets and not touching[b, i, k]:
+                k, touches = j - paddles, depth > 0.0
+                if touches and not touching[b, i, k]:
                     touched[b, i, k] += 1
                     touched_at[b, i, k] = time
-                touching[b, i, k] = meets
+                touching[b, i, k] = touches
             if depth <= 0.0:
                 continue
             fresh[0] = False
@@ -314,7 +314,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
             push[j, 1] += back * other * ny
 
     def yield_to_sides() -> None:
-        # What others push into a wall stays in front of it, as the wall does not yield.
+        # A body pushed into a wall stays in front of it, as the wall does not yield.
         for place in range(hards[0]):
             i, c = hard[place, 0], hard[place, 1]
             if c < len(lines) and (push[i, 0] != 0.0 or push[i, 1] != 0.0):
@@ -327,7 +327,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
     def hold_blocks(b: int) -> None:
         for i in range(first, movers):
             speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-            share = friction_share(speed, coefficients[b, GRIP])
+            share = friction_share(speed, coefficients[b, FRICTION])
             v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
 
     def settle(b: int, leapfrog_offset: float) -> None:
@@ -380,7 +380,7 @@ def _substeps(batch: Batch, may_collide: Array) -> None:
             pass_lines(b, leapfrog_offset)
             meet_each_other(b, (step + 1) * dt)
             if blocks > 0:
-                # Friction acts within a contact, which has to give back its share.
+                # Friction acts within a contact, which has to return its share.
                 hold_blocks(b)
                 meet_each_other(b, (step + 1) * dt)
             yield_to_sides()

@@ -16,7 +16,7 @@ from marl_airhockey.types import Array
 
 
 class PymunkBackend(Backend):
-    """B worlds in plain Python on Chipmunk: the reference for the other backends."""
+    """Backend with B worlds in plain Python on Chipmunk, the reference for others."""
 
     exact: ClassVar[bool] = True
     default_substeps: ClassVar[int] = 10
@@ -50,7 +50,7 @@ class PymunkBackend(Backend):
         return Stage(self._move, (command, before, after))
 
     def _move(self, command: Command, before: State, after: State) -> None:
-        """Fill ``after`` with the state a control step after ``before``."""
+        """Fill ``after`` with the state one control step after ``before``."""
         seats = command.velocity.shape[:2]
         goal = np.zeros((*seats, 2))
         imposed, lifted = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)

@@ -11,17 +11,17 @@ from marl_airhockey.types import Array
 PADDLE, PUCK, WALL, GOAL_LINE, BLOCK = 1, 2, 3, 4, 5
 """Collision types."""
 THICK = 0.5
-"""m: a wall this thick is never passed between two substeps."""
+"""Thickness of a wall, which no body passes between two substeps (m)."""
 NOTHING, EVERYTHING = pymunk.ShapeFilter(mask=0), pymunk.ShapeFilter()
-"""Filters: what a shape can touch."""
+"""Filters of the shapes that a shape can touch."""
 
 
 class Bodies:
     """Bodies of a scene in a space, in the order of a `State`.
 
     Args:
-        space: they are added to it.
-        scene: says what there is.
+        space: space that they are added to.
+        scene: scene of the bodies.
     """
 
     def __init__(self, space: pymunk.Space, scene: Scene) -> None:
@@ -30,9 +30,9 @@ class Bodies:
         self.shapes: list[pymunk.Shape] = []
         """Shape of each body."""
         self.index: dict[pymunk.Shape, int] = {}
-        """Number of each shape among those of its kind."""
-        self.grips: list[pymunk.Constraint] = []
-        """Joints that hold a block and its angle by friction, two a block."""
+        """Index of each shape among those of its kind."""
+        self.friction_joints: list[pymunk.Constraint] = []
+        """Friction joints of position and angle, two per block."""
         for i in range(len(scene.seats)):
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             self._add(pymunk.Circle(body, scene.table.paddle_radius), PADDLE, i)
@@ -58,7 +58,7 @@ class Bodies:
         self.index[shape] = index
 
     def _hold(self, body: pymunk.Body) -> None:
-        """Add Coulomb friction on the table: joints with a largest force."""
+        """Add Coulomb friction on the table: joints with a maximum force."""
         static = self._space.static_body
         for joint in (
             pymunk.PivotJoint(static, body, (0, 0), (0, 0)),
@@ -66,15 +66,15 @@ class Bodies:
         ):
             joint.max_bias = 0.0
             self._space.add(joint)
-            self.grips.append(joint)
+            self.friction_joints.append(joint)
 
 
 class Walls:
-    """Boxes behind every side of the table, with a sensor in the gap of a goal.
+    """Walls: boxes behind every side of the table, with a sensor in the gap of a goal.
 
     Args:
-        space: they are added to it.
-        scene: says what there is.
+        space: space that they are added to.
+        scene: scene of the walls.
     """
 
     def __init__(self, space: pymunk.Space, scene: Scene) -> None:

@@ -1,7 +1,7 @@
 """World of the pymunk backend: a space with paddles, pucks, blocks, walls and goals.
 
-Velocities inside a space are those half a substep ahead (leapfrog), so that a falling
-puck follows its parabola exactly; `leapfrog_offset` is added when they are read.
+Velocities in a space are half a substep ahead (leapfrog), so that a falling puck
+follows its parabola exactly; `leapfrog_offset` is added when they are read.
 """
 
 from __future__ import annotations
@@ -28,25 +28,25 @@ from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
 POCKET = 100.0
-"""m: pucks out of play wait here, far from everything."""
+"""Coordinate of pucks out of play, far from the table (m)."""
 ARM = 0.765
-"""Mean distance of a square's points from its centre, in halves of its side."""
+"""Mean distance of a square's points from its centre, per half of its side."""
 
 
 class Space:
-    """One world on pymunk.
+    """Space: one world in Chipmunk.
 
     Args:
-        scene: who and what is on the table.
-        control_dt: s.
-        substeps: physics steps in a control step.
+        scene: scene of the world.
+        control_dt: length of a control step, s.
+        substeps: number of physics steps in a control step.
     """
 
     def __init__(self, scene: Scene, control_dt: float, substeps: int) -> None:
         self.scene, self.substeps = scene, substeps
         self.dt = control_dt / substeps
         self.space = space = pymunk.Space()
-        # Overlap goes at once; contacts rest with a tenth of a millimetre of it.
+        # Overlap is removed at once; resting contacts keep a tenth of a millimetre.
         space.collision_slop, space.collision_bias = 1e-4, 0.0
         bodies, lines = scene.bodies, len(scene.goal_lines)
         pairs, table_sides = (bodies.paddles, bodies.pucks), len(scene.table.vertices)
@@ -59,9 +59,9 @@ class Space:
         self.bodies, self._walls = Bodies(space, scene), Walls(space, scene)
         self._sides, self._substep = sides(scene), 0
         self._out: dict[int, tuple[float, float]] = {}
-        """Where pucks went that are out of play, m."""
-        self._leaning: set[tuple[int, int]] = set()
-        """Pucks and sides that touch at a reset: no new bounce."""
+        """Positions at which pucks left play, by puck, m."""
+        self._initial_contacts: set[tuple[int, int]] = set()
+        """Pairs of puck and side in contact at a reset, which is no new bounce."""
         self._contact = False
         """True if a paddle touches a puck, or a puck has crossed a goal line."""
         space.on_collision(PADDLE, PUCK, begin=self._touch, separate=self._part)
@@ -72,7 +72,7 @@ class Space:
         self.set_physics({name: p.default for name, p in PARAMETERS.items()})
 
     def set_physics(self, values: dict[str, float]) -> None:
-        """Set the parameters of this world, by name."""
+        """Set the physical parameters by name."""
         pull = GRAVITY * np.sin(np.radians(values["tilt"]))
         self.space.gravity = (-float(pull), 0.0)
         self.space.damping = float(np.exp(-values["puck_damping"]))
@@ -84,22 +84,30 @@ class Space:
             shape.elasticity = values["paddle_restitution"]
         for body in self.bodies.all[bodies.puck]:
             body.mass = values["puck_mass"]
-        mass, grip = values["block_mass"], values["block_friction"]
+        mass, friction = values["block_mass"], values["block_friction"]
         for i, body in enumerate(self.bodies.all[bodies.block]):
             self.bodies.shapes[bodies.block][i].elasticity = values["block_restitution"]
             body.mass = mass
-            self.bodies.grips[2 * i].max_force = mass * grip
-            self.bodies.grips[2 * i + 1].max_force = mass * grip * ARM * half
+            self.bodies.friction_joints[2 * i].max_force = mass * friction
+            self.bodies.friction_joints[2 * i + 1].max_force = (
+                mass * friction * ARM * half
+            )
             if self.scene.block_shape == "square":
                 body.moment = mass * (2 * half) ** 2 / 6
 
     def reset(
         self, position: Array, velocity: Array, angle: Array, touching: Array
     ) -> None:
-        """Place every body, (N, 2) m and m/s, (N,) rad, with contacts that last.
+        """Place all bodies and set the contacts that exist already.
 
-        Shapes are added anew in their order, so that no contact of before lives on in
-        Chipmunk's caches and the same start gives the same episode.
+        Shapes are removed and added in order, which clears Chipmunk's contact caches:
+        equal initial states give equal episodes.
+
+        Args:
+            position: (N, 2) m.
+            velocity: (N, 2) m/s.
+            angle: (N,) rad.
+            touching: (paddles, pucks) bool.
         """
         self.space.remove(*self.bodies.shapes)
         self.space.add(*self.bodies.shapes)
@@ -116,7 +124,7 @@ class Space:
         self.touching[:] = touching
         radius = self.scene.table.puck_radius
         self._contact = True
-        self._leaning = {
+        self._initial_contacts = {
             (k, side)
             for k, (x, y) in enumerate(position[pucks].tolist())
             for side in range(len(self._sides))
@@ -129,13 +137,14 @@ class Space:
         command: tuple[Array, Array, Array],
         path: Array | None,
     ) -> None:
-        """Move by a control step.
+        """Advance by a control step.
 
         Args:
-            paddles: (paddles, 2) positions, m, and velocities, m/s; changed in place.
-            command: (paddles, 2) velocity at the end of the step, m/s, and (paddles,)
-                bool: moves at it all along and does not yield; touches nothing.
-            path: (substeps + 1, movers, 4) to be filled, or None.
+            paddles: positions (paddles, 2), m, and velocities, m/s; changed in place.
+            command: velocity at the end of the step (paddles, 2), m/s; True if the
+                paddle moves at it during all of the step and does not yield (paddles,);
+                True if it touches nothing (paddles,).
+            path: (substeps + 1, movers, 4), filled; or None.
         """
         (position, velocity), (goal, imposed, lifted) = paddles, command
         mean, size = np.zeros(goal.shape), 2 * self.scene.table.paddle_radius
@@ -147,21 +156,21 @@ class Space:
         for k in range(self.substeps):
             self._substep, left = k, self.substeps - k
             motion = position, velocity, goal, imposed, lifted, left, self.dt, size
-            met = ramp_paddles(*motion, mean)
+            overlap = ramp_paddles(*motion, mean)
             for i, body in enumerate(self.bodies.all[seats]):
                 body.velocity = tuple(mean[i].tolist())
-                if met:
+                if overlap:
                     body.position = tuple((position[i] - mean[i] * self.dt).tolist())
             self.space.step(self.dt)
             if self._contact:
                 self._settle()
             if path is not None:
                 self.read(path[k + 1])
-        self._leaning.clear()
+        self._initial_contacts.clear()
         self._lift(np.zeros_like(lifted))
 
     def read(self, rows: Array) -> None:
-        """Fill (movers, 4) with x, y, vx, vy of every body."""
+        """Fill ``rows`` (movers, 4) with x, y, vx, vy of every body."""
         pucks = self.scene.bodies.puck
         for i, body in enumerate(self.bodies.all):
             rows[i, :2], rows[i, 2:] = body.position, body.velocity
@@ -170,20 +179,20 @@ class Space:
             rows[pucks.start + k] = (*place, 0.0, 0.0)
 
     def read_angles(self, angle: Array, spin: Array) -> None:
-        """Fill (N,) rad and (N,) rad/s of the blocks."""
+        """Fill angle (N,), rad, and spin (N,), rad/s, of the blocks."""
         for i in range(self.scene.bodies.block.start, self.scene.bodies.block.stop):
             body = self.bodies.all[i]
             angle[i], spin[i] = body.angle, body.angular_velocity
 
     def close_goals(self, closed: Array) -> None:
-        """Make goal lines (M,) bool wall, and open the others again."""
+        """Close the goal lines that ``closed`` (M,) marks and open the others."""
         for index, plug in self._walls.plugs.items():
             line = self.scene.goal_lines[index]
             self._sides[line.side, 5] = 0.0 if closed[index] else (line.width or 0) / 2
             plug.filter = EVERYTHING if closed[index] else NOTHING
 
     def _begin(self) -> None:
-        """Forget the events of the last step."""
+        """Clear the events of the last step."""
         self.touched[:], self.touched_at[:] = 0, np.nan
         self.banked[:], self.crossed[:], self.crossed_velocity[:] = 0, False, 0.0
         for k in self._out:
@@ -191,7 +200,7 @@ class Space:
         self._contact = bool(self._out) or bool(self.touching.any())
 
     def _lift(self, lifted: Array) -> None:
-        """Take paddles (paddles,) bool off the table, and put the others back."""
+        """Disable contacts of the paddles that ``lifted`` (paddles,) marks."""
         for shape, up in zip(self.bodies.shapes, lifted.tolist(), strict=False):
             wanted = NOTHING if up else EVERYTHING
             if shape.filter != wanted:
@@ -226,17 +235,17 @@ class Space:
         self._bounces(self.bodies.index[puck], shape)
 
     def _bounces(self, k: int, shape: pymunk.Shape) -> bool:
-        """Count a bounce of puck k off a wall; False if it has touched it for long."""
+        """Count a bounce of puck k; return False for a contact since the reset."""
         side = self._walls.side.get(shape)
         if side is None:
             return True
-        if (k, side) in self._leaning:
+        if (k, side) in self._initial_contacts:
             return False
         self.banked[k, side] += 1
         return True
 
     def _soften(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Chipmunk takes the product of two restitutions, which is right for pucks."""
+        """Set the lower of both restitutions; Chipmunk's product is for pucks only."""
         a, b = arbiter.shapes
         arbiter.restitution = min(a.elasticity, b.elasticity)
 
@@ -244,7 +253,7 @@ class Space:
     def _ordered(
         arbiter: pymunk.Arbiter, kind: int
     ) -> tuple[pymunk.Shape, pymunk.Shape]:
-        """Return the shape of a kind and the other; Chipmunk may swap them."""
+        """Return the shape of a kind, then the other; Chipmunk may swap them."""
         a, b = arbiter.shapes
         return (a, b) if a.collision_type == kind else (b, a)
 
@@ -253,7 +262,7 @@ class Space:
         return self.bodies.index[a], self.bodies.index[b]
 
     def _settle(self) -> None:
-        """After a contact: no puck in a wall, above the cap, or in a goal in play."""
+        """Correct pucks after a contact: out of walls, below the cap, parked if out."""
         bodies, table, offset = (
             self.scene.bodies,
             self.scene.table,

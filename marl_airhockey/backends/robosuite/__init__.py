@@ -1,4 +1,4 @@
-"""A UR5e a seat, in MuJoCo."""
+"""Robosuite backend: one UR5e per seat, in MuJoCo."""
 
 from marl_airhockey.backends.robosuite.backend import make
 

@@ -1,4 +1,4 @@
-"""Robosuite backend: a UR5e a seat on a table in MuJoCo, built with robosuite."""
+"""Robosuite backend: one UR5e per seat on a table in MuJoCo, built with robosuite."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from marl_airhockey.backends._planar.paddles import follow
-from marl_airhockey.backends._planar.walls import sides
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.core.scene import Scene
@@ -29,16 +28,17 @@ if TYPE_CHECKING:
     from marl_airhockey.backends.robosuite.camera import Camera
 
 NEWEST = "mujoco==3.9.0"
-COARSEST = 0.004
-"""s of a physics step; with longer ones arms no longer follow."""
+"""Newest release that robosuite works with."""
+MAX_TIMESTEP = 0.004
+"""Longest physics step with which arms follow their command (s)."""
 
 
 class RobosuiteBackend(Backend):
-    """B MuJoCo simulations of robosuite's model, stepped in compiled code.
+    """Backend with B MuJoCo simulations of robosuite's model, stepped in compiled code.
 
-    Paddles track their command as an arm can, and feel the pucks; contacts take some
-    milliseconds. A prescribed paddle goes there at its seat's top speed at most.
-    ``trace`` holds the motion of the arms at every physics step: see `stepper.TRACE`.
+    Paddles track their command as an arm can, and pucks push them; contacts last some
+    milliseconds. A prescribed paddle moves at its seat's top speed at most. ``trace``
+    holds the motion of the arms at every physics step: see `arrays.TRACE`.
     """
 
     exact: ClassVar[bool] = True
@@ -78,60 +78,34 @@ class RobosuiteBackend(Backend):
         self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
     ) -> None:
         super().__init__(scene, num_worlds, control_dt, substeps)
-        if control_dt / substeps > COARSEST:
-            least = math.ceil(control_dt / COARSEST - 1e-9)
+        if control_dt / substeps > MAX_TIMESTEP:
+            least = math.ceil(control_dt / MAX_TIMESTEP - 1e-9)
             raise ValueError(
                 f"substeps: {substeps} are too few to hold an arm: at least {least}"
             )
-        # Without a screen; MuJoCo reads it when it is imported.
-        os.environ.setdefault("MUJOCO_GL", "egl")
-        # Robosuite warns of files that nobody needs; errors are shown.
-        log = logging.getLogger("robosuite_logs")
-        log.addFilter(lambda record: record.levelno >= logging.ERROR)
-        from marl_airhockey.backends.robosuite.env import AirHockey
-        from marl_airhockey.backends.robosuite.simulation import Arms
-        from marl_airhockey.backends.robosuite.stepper import TRACE, StaticScene
-
         self._dt = control_dt / substeps
-        env: Any = AirHockey(
-            scene=scene, timestep=self._dt, control_freq=1 / control_dt
-        )
-        env.reset()
-        model, data = env.lean_model(), env.sim.data._data
-        self.env = env
-        """The robosuite environment whose model all worlds copy."""
-        place, goal_lines = env.place, scene.goal_lines
-        self._static = StaticScene(
-            origin=place.origin,
-            rotation=place.rotation,
-            grips=np.array([hand.grip for hand in env.hands]),
-            low=np.array([hand.low for hand in env.hands]),
-            high=np.array([hand.high for hand in env.hands]),
-            radius=np.array([scene.table.paddle_radius, scene.table.puck_radius]),
-            pucks=scene.pucks,
-            normals=np.array([scene.table.normals[m.side] for m in goal_lines]).reshape(
-                -1, 2
-            ),
-            offsets=np.array([scene.table.offsets[m.side] for m in goal_lines]),
-            ways=np.array([scene.opening(m) for m in goal_lines]).reshape(-1, 2, 2),
-            sides=sides(scene),
-            whole=np.array([m.width is None for m in goal_lines], np.bool_),
-        )
-        moments = substeps + 1 if scene.path else 0
-        path = moments, scene.bodies.movers, 4
+        self.env = _make_env(scene, self._dt, control_dt)
+        """Robosuite environment whose model all worlds copy."""
+        from marl_airhockey.backends.robosuite.arrays import TRACE, make_static_scene
+        from marl_airhockey.backends.robosuite.simulation import Simulation
+
+        env = self.env
+        self._static = make_static_scene(scene, env.frame, env.hands)
+        model, data = env.physics_model(), env.sim.data._data
+        path = substeps + 1 if scene.path else 0, scene.bodies.movers, 4
         self.trace = np.zeros((num_worlds, substeps, len(scene.seats), len(TRACE)))
         self.worlds = [
-            Arms(env, copy.copy(model), path, self.trace[i], data)
+            Simulation(env, copy.copy(model), path, self.trace[i], data)
             for i in range(num_worlds)
         ]
         self._last_goal = np.zeros((num_worlds, len(scene.seats), 2))
         self._cameras: dict[int, Camera] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a copy is built from; OpenGL contexts are left behind."""
+        """Return the content of a copy, which opens its own OpenGL contexts."""
         return {
             "arguments": (self.scene, self.num_worlds, self.control_dt, self.substeps),
-            "worlds": [world.saved() for world in self.worlds],
+            "worlds": [world.save() for world in self.worlds],
             "last_goal": self._last_goal.copy(),
             "before": self._before,
         }
@@ -161,12 +135,12 @@ class RobosuiteBackend(Backend):
         return Stage(self._move, (command, before, after))
 
     def _move(self, command: Command, before: State, after: State) -> None:
-        """Fill ``after`` with the state a control step after ``before``."""
+        """Fill ``after`` with the state one control step after ``before``."""
         from marl_airhockey.backends.robosuite.stepper import advance
 
         goal = self._goal(command, before)
-        leads = [
-            world.lead(self._last_goal[i], goal[i], self.control_dt)
+        starts = [
+            world.advance_reference(self._last_goal[i], goal[i], self.control_dt)
             for i, world in enumerate(self.worlds)
         ]
 
@@ -174,8 +148,8 @@ class RobosuiteBackend(Backend):
             for i in range(*rows.indices(self.num_worlds)):
                 world = self.worlds[i]
                 advance(
-                    *(world.sim, self._static, world.output),
-                    *(leads[i], self._last_goal[i], goal[i]),
+                    *(world.views, self._static, world.output),
+                    *(starts[i], self._last_goal[i], goal[i]),
                     *(self._dt, self.substeps),
                 )
 
@@ -183,12 +157,12 @@ class RobosuiteBackend(Backend):
         after.time[:] = before.time + self.control_dt
         after.position[:] = before.position
         for i, world in enumerate(self.worlds):
-            world.retire()
+            world.park_pucks()
             world.read(after, i)
         self._last_goal[:] = goal
 
     def _goal(self, command: Command, before: State) -> Array:
-        """(B, seats, 2) m/s that arms are to reach; prescribed ones at top speed."""
+        """Return final velocities (B, seats, 2), m/s; prescribed ones at top speed."""
         goal = np.zeros(command.velocity.shape)
         seats = goal.shape[:2]
         imposed, lifted = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
@@ -206,14 +180,28 @@ class RobosuiteBackend(Backend):
 
         if width not in self._cameras:
             model, height = self.env.sim.model._model, round(width * 0.6)
-            self._cameras[width] = Camera(model, self.env.place, width, height)
-        places = self.worlds[world].data.qpos
-        return self._cameras[width].picture(places, camera, marks)
+            self._cameras[width] = Camera(model, self.env.frame, width, height)
+        qpos = self.worlds[world].data.qpos
+        return self._cameras[width].picture(qpos, camera, marks)
 
     def close(self) -> None:
         for camera in self._cameras.values():
             camera.close()
         self.env.close()
+
+
+def _make_env(scene: Scene, timestep: float, control_dt: float) -> Any:
+    """Return a robosuite environment of a scene, reset."""
+    # Headless rendering; MuJoCo reads the variable at its import.
+    os.environ.setdefault("MUJOCO_GL", "egl")
+    # Robosuite warns of optional files; only errors are shown.
+    log = logging.getLogger("robosuite_logs")
+    log.addFilter(lambda record: record.levelno >= logging.ERROR)
+    from marl_airhockey.backends.robosuite.env import AirHockey
+
+    env: Any = AirHockey(scene=scene, timestep=timestep, control_freq=1 / control_dt)
+    env.reset()
+    return env
 
 
 make = RobosuiteBackend

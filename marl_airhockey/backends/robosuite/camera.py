@@ -1,4 +1,4 @@
-"""Pictures of the arms and the table, drawn by MuJoCo without a screen."""
+"""Camera: pictures of the arms and the table, rendered by MuJoCo without a screen."""
 
 from __future__ import annotations
 
@@ -15,22 +15,28 @@ from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.types import Array
 
 GREEN = np.array([0.0, 0.62, 0.45, 0.55])
-"""Of marks."""
+"""Colour of marks (RGBA)."""
 THIN = 0.004
-"""m, half the width of a line; half the height of a circle"""
+"""Half the width of a line, and half the height of a circle (m)."""
 
 
 class Camera:
-    """Draws one model; kept for pictures of one size.
+    """Camera on one model, for pictures of one size.
+
+    Args:
+        model: MuJoCo's model.
+        frame: frame of the table.
+        width: of the pictures, pixels.
+        height: of the pictures, pixels.
 
     Raises:
-        RuntimeError: there is no OpenGL; says what to install.
+        RuntimeError: OpenGL is missing; the message names the packages to install.
     """
 
-    def __init__(self, model: Any, place: TableFrame, width: int, height: int) -> None:
-        self._place, self._model = place, model
+    def __init__(self, model: Any, frame: TableFrame, width: int, height: int) -> None:
+        self._frame, self._model = frame, model
         self._data = mujoco.MjData(model)
-        # The largest picture that the model's own buffer holds.
+        # Size of the model's offscreen buffer, which bounds the pictures.
         model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
         model.vis.global_.offheight = max(model.vis.global_.offheight, height)
         try:
@@ -41,16 +47,16 @@ class Camera:
                 "set MUJOCO_GL=egl before mujoco is imported, or libosmesa6 and "
                 f"set osmesa ({error})"
             ) from error
-        # Before MuJoCo ends OpenGL at the exit, even if nobody closes the environment.
+        # Close before MuJoCo ends OpenGL at the exit, if the environment is still open.
         atexit.register(_close, weakref.ref(self))
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
         self._option.geomgroup[1] = 1
         self._option.sitegroup[:] = 0
 
-    def picture(self, places: Array, name: str, marks: Sequence[Mark] = ()) -> Array:
-        """(H, W, 3) uint8 of what a camera sees at qpos, and a scenario's marks."""
-        self._data.qpos[:] = places
+    def picture(self, qpos: Array, name: str, marks: Sequence[Mark] = ()) -> Array:
+        """Return the picture (H, W, 3) uint8 of a camera at ``qpos``, with marks."""
+        self._data.qpos[:] = qpos
         mujoco.mj_fwdPosition(self._model, self._data)
         self._renderer.update_scene(self._data, name, self._option)
         for mark in marks:
@@ -62,10 +68,10 @@ class Camera:
         if scene.ngeom == scene.maxgeom:
             return
         geom = scene.geoms[scene.ngeom]
-        start = self._place.to_world(*mark.start, THIN)
+        start = self._frame.to_world(*mark.start, THIN)
         if mark.kind == "circle":
             kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [mark.radius, THIN, THIN]
-            orientation = self._place.rotation.ravel()
+            orientation = self._frame.rotation.ravel()
             mujoco.mjv_initGeom(geom, kind, size, start, orientation, GREEN)
         else:
             kind = (
@@ -76,12 +82,12 @@ class Camera:
             mujoco.mjv_initGeom(
                 geom, kind, np.zeros(3), start, np.eye(3).ravel(), GREEN
             )
-            end = self._place.to_world(*mark.end, THIN)
+            end = self._frame.to_world(*mark.end, THIN)
             mujoco.mjv_connector(geom, kind, 2 * THIN, start, end)
         scene.ngeom += 1
 
     def close(self) -> None:
-        """Let go of the OpenGL context."""
+        """Release the OpenGL context."""
         self._renderer.close()
 
 

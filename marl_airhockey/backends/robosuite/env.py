@@ -1,4 +1,4 @@
-"""Air hockey as a robosuite environment: one UR5e a seat, each with the contact law."""
+"""Robosuite environment of air hockey: one UR5e per seat, controlled by `osc`."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from robosuite.models.tasks import ManipulationTask
 
 from marl_airhockey.backends.robosuite.controller import SeatController
 from marl_airhockey.backends.robosuite.frames import TableFrame
-from marl_airhockey.backends.robosuite.inverse_kinematics import reach_for
+from marl_airhockey.backends.robosuite.inverse_kinematics import find_joint_angles
 from marl_airhockey.backends.robosuite.models import AirHockeyArena
-from marl_airhockey.backends.robosuite.table_physics import Surface
+from marl_airhockey.backends.robosuite.table_physics import TablePhysics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.types import Array
 
 ARM = "UR5e"
+"""Robosuite's name of the arm."""
 
 
 class TableController(OperationalSpaceController):
-    """Robosuite's arm controller with `law.torques` as its law.
+    """Arm controller of robosuite with the torques of `osc.torques`.
 
-    An action is the wanted velocity in the plane, as a share of the seat's top speed,
-    in the seat's ego frame; it passes the shared limits.
+    An action is the wanted velocity in the plane, as fractions of the seat's top speed,
+    in its ego frame; the shared limits apply.
     """
 
     def __init__(self, *args: Any, hand: SeatController, **rest: Any) -> None:
@@ -43,18 +44,18 @@ class TableController(OperationalSpaceController):
         self.input_min, self.input_max = -np.ones(2), np.ones(2)
 
     def bind(self) -> None:
-        """Take the arrays of the simulation as it is now."""
+        """Bind to the arrays of the present simulation."""
         model, data = self.sim.model._model, self.sim.data._data
         site = self.sim.model.site_name2id(self.ref_name)
         low, high = self.actuator_min, self.actuator_max
         self.hand.bind(model, data, site, self.qvel_index, low, high)
 
     def set_goal(self, action: Array) -> None:
-        self.hand.ask(np.asarray(action, dtype=float))
+        self.hand.set_action(np.asarray(action, dtype=float))
 
     def reset_goal(self, goal_update_mode: str = "achieved") -> None:
         self.bind()
-        self.hand.rest()
+        self.hand.hold()
 
     def run_controller(self) -> Array:
         self.torques = self.hand.torques()
@@ -68,7 +69,7 @@ class TableController(OperationalSpaceController):
 
 @register_composite_controller
 class AirHockeyController(CompositeController):
-    """Arms get a `TableController`, other parts what robosuite gives them."""
+    """Controller of a robot: `TableController` for arms, robosuite's for the rest."""
 
     name = "AIR_HOCKEY"
 
@@ -87,20 +88,23 @@ class AirHockeyController(CompositeController):
 
 
 def default_scene() -> Scene:
-    """One robot seat at home and a puck, on the standard table."""
+    """Return a scene of one robot seat at home and a puck, on the standard table."""
     table = TABLES["standard"]
     return Scene(table, (make_seat("robot", table, 0),), pucks=1)
 
 
 class AirHockey(ManipulationEnv):
-    """``robosuite.make("AirHockey", robots="UR5e")``: a table, arms, pucks, blocks.
+    """Environment of ``robosuite.make("AirHockey", robots="UR5e")``.
 
     Args:
         robots: one name for each seat of the scene.
-        scene: who and what is on the table; one seat and a puck unless given.
-        timestep: s of a physics step.
-        control_freq: control steps a second.
-        rest: of robosuite's environments.
+        scene: scene on the table; None for `default_scene`.
+        timestep: length of a physics step, s.
+        control_freq: control steps per second.
+        rest: further arguments of robosuite's environments.
+
+    Raises:
+        ValueError: robots that are not one UR5e per seat.
     """
 
     def __init__(
@@ -118,11 +122,11 @@ class AirHockey(ManipulationEnv):
                 f"robots: {robots!r}; {len(self.scene.seats)} seats are played "
                 f"by as many {ARM}"
             )
-        self.place = TableFrame(self.scene.defaults.get("tilt", 0.0))
+        self.frame = TableFrame(self.scene.defaults.get("tilt", 0.0))
         period = 1 / control_freq
         count = len(self.scene.seats)
         self.hands = [
-            SeatController(self.scene, self.place, i, period) for i in range(count)
+            SeatController(self.scene, self.frame, i, period) for i in range(count)
         ]
         macros.SIMULATION_TIMESTEP = timestep
         configs = [
@@ -152,8 +156,8 @@ class AirHockey(ManipulationEnv):
             "horizon": 10**9,
             "ignore_done": True,
         }
-        self.surface: Surface | None = None
-        self._ready: list[Array | None] = [None] * count
+        self.table_physics: TablePhysics | None = None
+        self._home_angles: list[Array | None] = [None] * count
         super().__init__(
             robots=list(names),
             controller_configs=configs,
@@ -165,15 +169,15 @@ class AirHockey(ManipulationEnv):
         )
 
     def _check_robot_configuration(self, robots: Any) -> None:
-        """Any number of arms."""
+        """Accept any number of arms."""
 
     def _load_model(self) -> None:
         super()._load_model()
         for i, robot in enumerate(self.robots):
-            position, heading = self.place.base(self.scene, i)
+            position, heading = self.frame.base(self.scene, i)
             robot.robot_model.set_base_xpos(position)
             robot.robot_model.set_base_ori([0, 0, heading])
-        arena = AirHockeyArena(self.scene, self.place)
+        arena = AirHockeyArena(self.scene, self.frame)
         arena.set_origin([0, 0, 0])
         self.model = ManipulationTask(
             mujoco_arena=arena,
@@ -182,57 +186,57 @@ class AirHockey(ManipulationEnv):
 
     def _initialize_sim(self, xml_string: str | None = None) -> None:
         super()._initialize_sim(xml_string)
-        _set_up(self.sim.model._model)
+        _disable_air_and_links(self.sim.model._model)
 
-    def lean_model(self) -> Any:
-        """The same MuJoCo model without what is only to be seen: 2 MB instead of 34."""
+    def physics_model(self) -> Any:
+        """Return the same MuJoCo model without its visuals: 2 MB instead of 34."""
         spec = mujoco.MjSpec.from_string(self.model.get_xml())
         spec.compiler.discardvisual = True
-        # Room for contacts as they are needed, not for thousands in every world.
+        # Contact memory grows on demand, instead of thousands per world.
         spec.nconmax = spec.njmax = -1
         model = spec.compile()
         model.opt.timestep = self.sim.model._model.opt.timestep
-        _set_up(model)
+        _disable_air_and_links(model)
         return model
 
     def _setup_references(self) -> None:
         super()._setup_references()
         model, data = self.sim.model._model, self.sim.data._data
-        self.surface = Surface(self.scene, self.place, model, data)
+        self.table_physics = TablePhysics(self.scene, self.frame, model, data)
         for i, robot in enumerate(self.robots):
-            if self._ready[i] is None:
-                self._ready[i] = reach_for(
+            if self._home_angles[i] is None:
+                self._home_angles[i] = find_joint_angles(
                     model,
                     data,
                     robot.eef_site_id["right"],
                     robot._ref_joint_pos_indexes,
                     robot._ref_joint_vel_indexes,
-                    self.place.to_world(*self.hands[i].home),
-                    self.hands[i].grip,
+                    self.frame.to_world(*self.hands[i].home),
+                    self.hands[i].foot_rotation,
                 )
-            robot.init_qpos = self._ready[i]
+            robot.init_qpos = self._home_angles[i]
 
     def _pre_action(self, action: Array, policy_step: bool = False) -> None:
         super()._pre_action(action, policy_step)
-        assert self.surface is not None
-        self.surface.act()
+        assert self.table_physics is not None
+        self.table_physics.apply_friction()
 
     def _setup_observables(self) -> Any:
         return {}
 
     def reward(self, action: Array | None = None) -> float:
-        """Scenarios have the rewards."""
+        """Return 0: scenarios hold the rewards."""
         return 0.0
 
     def _check_success(self) -> bool:
         return False
 
 
-def _set_up(model: Any) -> None:
-    """What robosuite's models have otherwise: air, and links that touch."""
-    # A puck would slow down in air.
+def _disable_air_and_links(model: Any) -> None:
+    """Disable the air and the contacts of links that robosuite's models have."""
+    # Air would slow pucks down.
     model.opt.density = model.opt.viscosity = 0.0
     for k in range(model.ngeom):
         if model.geom(k).name.startswith(("robot", "mount", "fixed_mount")):
-            # Only the paddle touches anything: links pass through what is there.
+            # Only the paddle has contacts: links pass through everything.
             model.geom_contype[k] = model.geom_conaffinity[k] = 0

@@ -1,4 +1,4 @@
-"""The table, pucks and blocks as robosuite models, and the paddle as its gripper."""
+"""Models for robosuite: the table with pucks and blocks, and the paddle as gripper."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
 HERE = Path(__file__).parent
+"""Folder of the XML files."""
 SLIDES, RAIL, FOOT = 2, 8, 4
-"""Bits of what touches what: paddle's side, pucks and blocks; these and rails; the
-paddle's foot and the table."""
+"""Bits of contacts between: paddle's side, pucks and blocks; pucks, blocks and rails;
+the paddle's foot and the table."""
 THICK = 0.06
-"""m, of rails"""
+"""Thickness of rails (m)."""
 TALL = 0.02
-"""m, half the height of what touches sideways"""
+"""Half the height of rails, pucks and blocks (m)."""
 LOW = 0.004
-"""m, half the height of what a puck is felt with: higher up, one that is caught between
-paddle and rail would tip the paddle"""
+"""Half the height of a puck's collision shape (m): a higher one that is caught between
+paddle and rail would tip the paddle."""
 IMPEDANCE = "0.99 0.999 0.001 0.5 2"
-"""solimp of contacts that return a set share of the speed"""
+"""Impedance (solimp) of contacts with a set restitution."""
 
 
 @register_gripper
 class AirHockeyPaddle(GripperModel):
-    """A round paddle in place of a gripper; nothing in it moves."""
+    """Round paddle in place of a gripper, without joints."""
 
     def __init__(self, idn: int = 0) -> None:
         super().__init__(str(HERE / "paddle.xml"), idn=idn)
@@ -40,25 +41,25 @@ class AirHockeyPaddle(GripperModel):
 
     @property
     def init_qpos(self) -> None:
-        """There are no joints."""
+        """Joint positions: None, without joints."""
         return None
 
 
 class AirHockeyArena(Arena):
-    """A tilted table with its rails, and all pucks and blocks that a scene has.
+    """Arena of a scene: a tilted table with rails, pucks, blocks and obstacles.
 
     Args:
-        scene: who and what is on the table.
-        place: where it stands.
+        scene: scene on the table.
+        frame: frame of the table.
     """
 
-    def __init__(self, scene: Scene, place: TableFrame) -> None:
+    def __init__(self, scene: Scene, frame: TableFrame) -> None:
         super().__init__(str(HERE / "arena.xml"))
         self.scene = scene
         self.table = new_body(
             "table",
-            pos=array_to_string(place.origin),
-            quat=array_to_string(place.quaternion),
+            pos=array_to_string(frame.origin),
+            quat=array_to_string(frame.quaternion),
         )
         self.worldbody.append(self.table)
         self._surface()
@@ -69,7 +70,7 @@ class AirHockeyArena(Arena):
             self._mover(
                 f"{kind}{number}", kind, scene.bodies.radius[k + len(scene.seats)]
             )
-        self._stands(place)
+        self._stands(frame)
         for k, obstacle in enumerate(scene.obstacles):
             self._obstacle(k, obstacle.start, obstacle.end, obstacle.radius)
 
@@ -84,7 +85,7 @@ class AirHockeyArena(Arena):
             size=array_to_string([*size, 0.025]),
             pos="0 0 -.0251",
             material="field",
-            **_drawn(),
+            **_visual(),
         )
         self._add(
             "surface",
@@ -94,11 +95,11 @@ class AirHockeyArena(Arena):
             condim="3",
             friction="0.05 0.005 0.0001",
             solref="0.05 1",
-            **_felt(FOOT),
+            **_collision(FOOT),
         )
 
     def _rail(self, side: int) -> None:
-        """A plane for a whole side, which nothing passes; boxes beside a goal line."""
+        """Add the rail of a side: a plane, or boxes beside its goal lines."""
         table, scene = self.scene.table, self.scene
         start, end = table.ends(side)
         along = (end - start) / np.linalg.norm(end - start)
@@ -108,7 +109,7 @@ class AirHockeyArena(Arena):
         ]
         posts = [start, *(p for m in goal_lines for p in scene.opening(m)), end]
         for k in range(0, len(posts), 2):
-            # Drawn and felt pieces end at posts, and overlap at corners.
+            # Pieces end at posts and overlap at corners.
             a = posts[k] - along * THICK * (k == 0)
             b = posts[k + 1] + along * THICK * (k + 2 == len(posts))
             middle = (a + b) / 2 - normal * THICK / 2
@@ -120,7 +121,7 @@ class AirHockeyArena(Arena):
                 "xyaxes": array_to_string([*along, 0, -along[1], along[0], 0]),
             }
             name = f"rail{side}_{k // 2}"
-            self._add(f"{name}_visual", "box", material="rail", **box, **_drawn())
+            self._add(f"{name}_visual", "box", material="rail", **box, **_visual())
             if goal_lines:
                 self._add(name, "box", priority="3", **box, **_sliding(RAIL))
         if not goal_lines:
@@ -135,7 +136,7 @@ class AirHockeyArena(Arena):
             )
 
     def _mover(self, name: str, kind: str, radius: float) -> None:
-        """A puck or a block: it slides and turns in the plane of the table."""
+        """Add a puck or a block, which moves and rotates in the plane of the table."""
         body = new_body(name, pos=f"0 0 {TALL}")
         for joint, axis in (("x", "1 0 0"), ("y", "0 1 0")):
             body.append(new_joint(name=f"{name}_{joint}", type="slide", axis=axis))
@@ -150,13 +151,13 @@ class AirHockeyArena(Arena):
                 size=array_to_string(size),
                 material=kind,
                 mass="0",
-                **_drawn(),
+                **_visual(),
             )
         )
         body.append(
             new_geom(
                 name,
-                # Two capsules meet in one point, as discs in a plane do.
+                # Two capsules touch in one point, as discs in a plane do.
                 "box" if square else "capsule",
                 pos=array_to_string([0, 0, LOW - TALL]),
                 size=array_to_string([*size[:-1], LOW]),
@@ -167,20 +168,20 @@ class AirHockeyArena(Arena):
         )
         self.table.append(body)
 
-    def _stands(self, place: TableFrame) -> None:
-        """Legs of the table and pedestals of the arms, to look at."""
+    def _stands(self, frame: TableFrame) -> None:
+        """Add legs of the table and pedestals of the arms, as visuals."""
         x, y = self.scene.table.size / 2 - 0.08
         for k, (i, j) in enumerate(((-x, -y), (-x, y), (x, -y), (x, y))):
-            top = place.to_world(float(i), float(j), -0.05)
+            top = frame.to_world(float(i), float(j), -0.05)
             self._stand(f"leg{k}", "box", top, "0.025 0.025")
         for k in range(len(self.scene.seats)):
-            base, _ = place.base(self.scene, k)
+            base, _ = frame.base(self.scene, k)
             self._stand(f"pedestal{k}", "cylinder", base, "0.09")
 
     def _stand(self, name: str, kind: str, top: Array, size: str) -> None:
         x, y, z = top
         size, pos = f"{size} {z / 2}", array_to_string([x, y, z / 2])
-        rest = {"size": size, "pos": pos, "material": "rail", **_drawn()}
+        rest = {"size": size, "pos": pos, "material": "rail", **_visual()}
         self.worldbody.append(new_geom(f"{name}_visual", kind, **rest))
 
     def _obstacle(
@@ -202,14 +203,14 @@ class AirHockeyArena(Arena):
         )
 
 
-def _drawn() -> dict[str, str]:
+def _visual() -> dict[str, str]:
     return {"group": "1", "contype": "0", "conaffinity": "0"}
 
 
-def _felt(bits: int) -> dict[str, str]:
+def _collision(bits: int) -> dict[str, str]:
     both = {"contype": str(bits), "conaffinity": str(bits)}
     return {"group": "0", "rgba": "0 0 0 0", **both}
 
 
 def _sliding(bits: int) -> dict[str, str]:
-    return {"condim": "1", "solimp": IMPEDANCE, **_felt(bits)}
+    return {"condim": "1", "solimp": IMPEDANCE, **_collision(bits)}

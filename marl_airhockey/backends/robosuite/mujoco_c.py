@@ -1,4 +1,4 @@
-"""MuJoCo's own functions, called by name from compiled code (and cached with it)."""
+"""Functions of MuJoCo's C library for compiled code, bound by name (and cacheable)."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ def _function(name: str, *arguments: Any) -> Any:
 
 _p, _i = types.intp, types.int32
 step1 = _function("mj_step1", _p)
-"""Model, data: all that follows from positions and velocities."""
+"""First half of a step (model, data): all that positions and velocities determine."""
 step2 = _function("mj_step2", _p)
-"""Model, data: forces, accelerations, the step itself."""
+"""Second half of a step (model, data): forces, accelerations, integration."""
 full_mass = _function("mj_fullM", _p, _p)
-"""Model, (nv, nv) to fill, data's qM."""
+"""Joint-space inertia (model, (nv, nv) to fill, data's qM)."""
 site_jacobian = _function("mj_jacSite", _p, _p, _p, _i)
-"""Model, data, (3, nv) and (3, nv) to fill, site."""
+"""Jacobian of a site (model, data, (3, nv) and (3, nv) to fill, site)."""
 jacobian_rate = _function("mj_jacDot", _p, _p, _p, _p, _i)
-"""Model, data, (3, nv) and (3, nv) to fill, (3,) point, body."""
+"""Time derivative of a Jacobian (model, data, (3, nv) and (3, nv) to fill, (3,) point,
+body)."""

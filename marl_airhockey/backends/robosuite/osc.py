@@ -1,8 +1,8 @@
-"""Torques that move a paddle over the table and keep it pressed on.
+"""Operational space control: torques that move a paddle and press it on the table.
 
-Hybrid operational space control in the table frame (Khatib, 1987): motion in the
-plane, a force along the normal, a fixed orientation. What keeps the contact (normal,
-orientation, gravity) comes first; the motion in the plane gets the torque that is left.
+Hybrid control in the table frame (Khatib, 1987): motion in the plane, a force along the
+normal, a fixed orientation. The torques of the contact (normal, orientation, gravity)
+have priority; the motion in the plane gets the remaining torque.
 """
 
 from __future__ import annotations
@@ -12,35 +12,36 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numba import njit
 
+from marl_airhockey.backends.robosuite.cholesky import factor, solve
 from marl_airhockey.core.physics import PARAMETERS
 from marl_airhockey.types import Array
 
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of the law; damping follows from the stiffness."""
+    """Gains of the controller; damping follows from the stiffness."""
 
     plane: float = PARAMETERS["arm_stiffness"].default
-    """1/s2, of the position in the plane"""
+    """Stiffness of the position in the plane, 1/s2"""
     plane_ratio: float = 1.0
     """Damping ratio in the plane"""
     lift: float = 400.0
-    """1/s2, toward the table, of a paddle that has left it"""
+    """Stiffness toward the table of a paddle that has left it, 1/s2"""
     lift_ratio: float = 3.0
     """Damping ratio along the normal"""
     kp_orientation: float = 1600.0
-    """1/s2, of the orientation"""
+    """Stiffness of the orientation, 1/s2"""
     orientation_ratio: float = 1.0
     """Damping ratio of the orientation"""
     correction: float = 5.0
-    """m/s2, largest acceleration beside that of the reference"""
+    """Largest acceleration beside that of the reference, m/s2"""
     force: float = PARAMETERS["arm_force"].default
-    """N, on the table. With 20 N, and a fourth of the stiffness in turning, a puck that
-    is jammed in a corner could tip the paddle by 4 degrees."""
+    """Force on the table, N. With 20 N, and a fourth of the stiffness of the
+    orientation, a puck that is jammed in a corner could tip the paddle by 4 degrees."""
 
     @property
     def array(self) -> Array:
-        """As `torques` takes them."""
+        """Gains as an array (8,) for `torques`."""
         return np.array(astuple(self))
 
 
@@ -54,105 +55,168 @@ def torques(
     position: Array,
     rotation: Array,
     table: Array,
-    grip: Array,
+    wanted_rotation: Array,
     reference: Array,
     gains: Array,
     low: Array,
     high: Array,
     out: Array,
 ) -> float:
-    """Torques of the n joints of an arm.
+    """Compute the torques of the n joints of an arm.
 
     Args:
         jacobian: (6, n) of the paddle's foot: velocity, angular velocity; world frame.
         drift: (6,) its time derivative times the joint speeds.
-        mass: (n, n) joint-space inertia.
+        mass: (n, n) joint-space inertia, overwritten.
         bias: (n,) gravity, Coriolis and centrifugal torques.
         speeds: (n,) joint speeds, rad/s.
         position: (3,) of the foot in the table frame, m; z is its height.
-        rotation: (3, 3) of the foot in the world.
+        rotation: (3, 3) from the foot to the world frame.
         table: (3, 3) from the table frame to the world's.
-        grip: (3, 3) wanted rotation.
+        wanted_rotation: (3, 3) wanted ``rotation``.
         reference: (3, 2) wanted position, velocity and acceleration in the plane.
         gains: (8,) of `Gains`.
-        low: (n,) smallest torques.
-        high: (n,) largest.
-        out: (n,) is filled with the torques, Nm.
+        low: (n,) smallest torques, Nm.
+        high: (n,) largest torques, Nm.
+        out: (n,) filled with the torques, Nm.
 
     Returns:
         The share of the motion in the plane that the torques allow, 0 to 1.
     """
-    n = len(speeds)
-    twist = np.zeros(6)
+    twist, contact, motion = np.zeros(6), np.zeros(6), np.zeros(6)
     for i in range(6):
-        for j in range(n):
+        for j in range(len(speeds)):
             twist[i] += jacobian[i, j] * speeds[j]
+    _plane_acceleration(twist, position, table, reference, gains, motion)
+    _contact_acceleration(
+        *(twist, drift, position, rotation, table, wanted_rotation, gains, contact)
+    )
+    _to_forces(jacobian, mass, contact, motion)
+    for i in range(3):
+        contact[i] -= table[i, 2] * gains[7]
+    return _fit(jacobian, bias, contact, motion, low, high, out)
+
+
+@njit(cache=True)
+def _velocity(twist: Array, table: Array) -> Array:
+    """Return the velocity (3,) of the foot in the table frame, m/s."""
     velocity = np.zeros(3)
     for i in range(3):
         for j in range(3):
             velocity[i] += table[j, i] * twist[j]
+    return velocity
 
+
+@njit(cache=True)
+def _plane_acceleration(
+    twist: Array,
+    position: Array,
+    table: Array,
+    reference: Array,
+    gains: Array,
+    out: Array,
+) -> None:
+    """Fill ``out`` (6,) with the wanted acceleration in the plane, world frame."""
+    velocity = _velocity(twist, table)
     damp = 2.0 * gains[1] * np.sqrt(gains[0])
-    ax = gains[0] * (reference[0, 0] - position[0]) + damp * (
-        reference[1, 0] - velocity[0]
-    )
-    ay = gains[0] * (reference[0, 1] - position[1]) + damp * (
-        reference[1, 1] - velocity[1]
-    )
+    dx, dy = reference[0, 0] - position[0], reference[0, 1] - position[1]
+    ax = gains[0] * dx + damp * (reference[1, 0] - velocity[0])
+    ay = gains[0] * dy + damp * (reference[1, 1] - velocity[1])
     size = np.sqrt(ax * ax + ay * ay)
     if size > gains[6]:
         ax, ay = ax * gains[6] / size, ay * gains[6] / size
     ax, ay = ax + reference[2, 0], ay + reference[2, 1]
-    az = -2.0 * gains[3] * np.sqrt(gains[2]) * velocity[2]
+    for i in range(3):
+        out[i] = table[i, 0] * ax + table[i, 1] * ay
+
+
+@njit(cache=True)
+def _contact_acceleration(
+    twist: Array,
+    drift: Array,
+    position: Array,
+    rotation: Array,
+    table: Array,
+    wanted_rotation: Array,
+    gains: Array,
+    out: Array,
+) -> None:
+    """Fill ``out`` (6,) with the acceleration that keeps height and orientation."""
+    az = -2.0 * gains[3] * np.sqrt(gains[2]) * _velocity(twist, table)[2]
     if position[2] > 0.0:
         az -= gains[2] * position[2]
-
-    # Half the antisymmetric part of grip @ rotation.T: the error as a rotation vector.
+    # The error as a rotation vector: half the antisymmetric part of
+    # wanted_rotation @ rotation.T.
     error = np.zeros((3, 3))
     for i in range(3):
         for j in range(3):
             for k in range(3):
-                error[i, j] += grip[i, k] * rotation[j, k]
-    turn_damp = 2.0 * gains[5] * np.sqrt(gains[4])
-    first, second = np.zeros(6), np.zeros(6)
+                error[i, j] += wanted_rotation[i, k] * rotation[j, k]
+    damp = 2.0 * gains[5] * np.sqrt(gains[4])
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         off = 0.5 * (error[b, a] - error[a, b])
-        first[i] = table[i, 2] * az - drift[i]
-        first[3 + i] = gains[4] * off - turn_damp * twist[3 + i] - drift[3 + i]
-        second[i] = table[i, 0] * ax + table[i, 1] * ay
+        out[i] = table[i, 2] * az - drift[i]
+        out[3 + i] = gains[4] * off - damp * twist[3 + i] - drift[3 + i]
 
-    # The inertia that the foot is felt with: (J M^-1 J^T)^-1.
+
+@njit(cache=True)
+def _to_forces(jacobian: Array, mass: Array, first: Array, second: Array) -> None:
+    """Multiply two accelerations (6,) by the inertia at the foot, in place.
+
+    That inertia is (J M^-1 J^T)^-1; ``mass`` M is overwritten by its factor.
+    """
+    n = len(mass)
     solved = np.empty((6, n))
     solved[:] = jacobian
-    _factor(mass)
+    factor(mass)
     for i in range(6):
-        _solve(mass, solved[i])
-    felt = np.zeros((6, 6))
+        solve(mass, solved[i])
+    mobility = np.zeros((6, 6))
     for i in range(6):
         for j in range(6):
             for k in range(n):
-                felt[i, j] += jacobian[i, k] * solved[j, k]
-    _factor(felt)
-    _solve(felt, first)
-    _solve(felt, second)
-    for i in range(3):
-        first[i] -= table[i, 2] * gains[7]
+                mobility[i, j] += jacobian[i, k] * solved[j, k]
+    factor(mobility)
+    solve(mobility, first)
+    solve(mobility, second)
 
-    share = 1.0
-    motion = np.zeros(n)
+
+@njit(cache=True)
+def _fit(
+    jacobian: Array,
+    bias: Array,
+    contact: Array,
+    motion: Array,
+    low: Array,
+    high: Array,
+    out: Array,
+) -> float:
+    """Fill ``out`` with torques within their limits; return the share of the motion.
+
+    Args:
+        jacobian: (6, n) of the foot.
+        bias: (n,) Nm.
+        contact: (6,) force and torque at the foot that have priority.
+        motion: (6,) force and torque of the motion, of which a share is applied.
+        low: (n,) smallest torques, Nm.
+        high: (n,) largest torques, Nm.
+        out: (n,) filled, Nm.
+    """
+    n, share = len(bias), 1.0
+    moving = np.zeros(n)
     for j in range(n):
         out[j] = bias[j]
         for i in range(6):
-            out[j] += jacobian[i, j] * first[i]
-            motion[j] += jacobian[i, j] * second[i]
-        if motion[j] > 1e-9:
-            share = min(share, (high[j] - out[j]) / motion[j])
-        elif motion[j] < -1e-9:
-            share = min(share, (low[j] - out[j]) / motion[j])
+            out[j] += jacobian[i, j] * contact[i]
+            moving[j] += jacobian[i, j] * motion[i]
+        if moving[j] > 1e-9:
+            share = min(share, (high[j] - out[j]) / moving[j])
+        elif moving[j] < -1e-9:
+            share = min(share, (low[j] - out[j]) / moving[j])
     share = max(share, 0.0)
     for j in range(n):
-        out[j] = min(max(out[j] + share * motion[j], low[j]), high[j])
+        out[j] = min(max(out[j] + share * moving[j], low[j]), high[j])
     return share
 
 
@@ -165,10 +229,10 @@ def subtract_payload(
     mass: Array,
     bias: Array,
 ) -> None:
-    """Take a point mass at the paddle's foot out of what the law knows of its arm.
+    """Subtract a point mass at the paddle's foot, which the controller does not know.
 
     Args:
-        load: kg.
+        load: mass, kg.
         gravity: (3,) m/s2, world frame.
         jacobian: (6, n) of the foot.
         drift: (6,) its time derivative times the joint speeds.
@@ -182,52 +246,3 @@ def subtract_payload(
             bias[i] -= pull * (drift[k] - gravity[k])
             for j in range(n):
                 mass[i, j] -= pull * jacobian[k, j]
-
-
-@njit(cache=True)
-def _factor(a: Array) -> None:
-    """Cholesky's lower factor of a symmetric positive matrix, in place."""
-    n = len(a)
-    for j in range(n):
-        for k in range(j):
-            a[j, j] -= a[j, k] * a[j, k]
-        a[j, j] = np.sqrt(a[j, j])
-        for i in range(j + 1, n):
-            for k in range(j):
-                a[i, j] -= a[i, k] * a[j, k]
-            a[i, j] /= a[j, j]
-
-
-@njit(cache=True)
-def _solve(factor: Array, b: Array) -> None:
-    """Solve with a Cholesky factor, in place."""
-    n = len(b)
-    for i in range(n):
-        for k in range(i):
-            b[i] -= factor[i, k] * b[k]
-        b[i] /= factor[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            b[i] -= factor[k, i] * b[k]
-        b[i] /= factor[i, i]
-
-
-@njit(cache=True)
-def reference(
-    start: Array, old: Array, new: Array, period: float, elapsed: float, out: Array
-) -> None:
-    """The wanted motion some time into a control step: a linear ramp of velocity.
-
-    Args:
-        start: (2,) m at its beginning.
-        old: (2,) m/s at its beginning.
-        new: (2,) m/s at its end.
-        period: s of the step.
-        elapsed: s since its beginning.
-        out: (3, 2) is filled with position, velocity and acceleration.
-    """
-    for i in range(2):
-        a = (new[i] - old[i]) / period
-        out[0, i] = start[i] + old[i] * elapsed + 0.5 * a * elapsed * elapsed
-        out[1, i] = old[i] + a * elapsed
-        out[2, i] = a

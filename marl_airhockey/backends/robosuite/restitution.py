@@ -1,4 +1,4 @@
-"""What returns speed in a contact, in MuJoCo's terms."""
+"""Restitution of contacts, as parameters of MuJoCo."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from marl_airhockey.types import Array
 
 STIFFNESS = 0.19
 """Root of a contact's stiffness times the time step. In a stiffer one the first step,
-which is partial, counts more: what returns depends on the moment of the contact. In a
-softer one bodies go deeper into each other."""
-MOMENTS = 32
-LONGEST = 200
-"""Steps, of any contact"""
+which is partial, counts more: the restitution depends on the time of the contact within
+a step. In a softer one bodies overlap more."""
+PHASES = 32
+"""Number of times within a step at which contacts begin."""
+MAX_STEPS = 200
+"""Longest contact, in steps."""
 
 
 def restitution_of(ratio: Array) -> Array:
-    """The share of the speed that a damped spring returns which can only push.
+    """Compute the share of the speed that a damped spring, which only pushes, returns.
 
-    Taken step by step, as MuJoCo's integrator does, for contacts that begin at any
-    moment within a step; halfway between the least and the most of them.
+    It is integrated as by MuJoCo, for contacts that begin at any time within a step;
+    the result is halfway between the least and the greatest share.
 
     Args:
         ratio: (N,) damping ratios.
@@ -27,12 +28,12 @@ def restitution_of(ratio: Array) -> Array:
     Returns:
         (N,) shares.
     """
-    # In units of the time step and of the speed before.
-    begun = -(np.arange(MOMENTS) + 0.5) / MOMENTS
-    depth = np.broadcast_to(begun, (len(ratio), MOMENTS)).copy()
+    # Units: the time step and the speed before the contact.
+    begun = -(np.arange(PHASES) + 0.5) / PHASES
+    depth = np.broadcast_to(begun, (len(ratio), PHASES)).copy()
     speed = -np.ones_like(depth)
     damping = 2 * ratio[:, None] * STIFFNESS
-    for _ in range(LONGEST):
+    for _ in range(MAX_STEPS):
         push = np.maximum(-(STIFFNESS**2) * depth - damping * speed, 0.0)
         speed += np.where(depth < 0, push, 0.0)
         depth += speed
@@ -44,7 +45,7 @@ _SHARES = restitution_of(_RATIOS)
 
 
 def solref(restitution: float, timestep: float) -> Array:
-    """(2,) direct solref of a contact that returns a share of the normal speed."""
+    """Return the direct solref (2,) of contacts with a restitution."""
     ratio = np.interp(-restitution, -_SHARES, _RATIOS)
     stiffness = (STIFFNESS / timestep) ** 2
     return np.array([-stiffness, -2 * ratio * np.sqrt(stiffness)])
