@@ -194,8 +194,8 @@ def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
             nx, ny, offset, mx, my, half = static.sides[s]
             aside = nx * (y - my) - ny * (x - mx)
             # A puck at rest on a rail sinks in and rises by less than `RELEASE`.
-            near = static.radius[1] + (RELEASE if output.against[p, s] else 0.0)
-            touches = nx * x + ny * y + offset < near and abs(aside) >= half
+            limit = static.radius[1] + (RELEASE if output.against[p, s] else 0.0)
+            touches = nx * x + ny * y + offset < limit and abs(aside) >= half
             if touches and not output.against[p, s]:
                 output.banked[p, s] += 1
             output.against[p, s] = touches
