@@ -26,6 +26,8 @@ import marl_airhockey as ah
 WORLDS, STEPS = 3, 200
 PROFILES = ("ideal", "robot")
 TOLERANCE = {"numba": 0.0, "pymunk": 1e-9}
+ON_PURPOSE = {"free_for_all": 1e-15}
+"""Paddles beside a retired one: their acceleration, and so a cost, is rounded anew."""
 PLAY = """
 import sys
 import numpy as np
@@ -44,7 +46,8 @@ for _ in range(int(steps)):
     rows |= {f"term {name}": term for name, term in step.terms.items()}
     state = world.state
     rows |= {"position": state.position, "velocity": state.velocity}
-    rows |= {f"memory {name}": row for name, row in world.memory.items()}
+    memory = {{"met": "any_touch"}.get(k, k): v for k, v in world.memory.items()}
+    rows |= {f"memory {name}": row for name, row in memory.items()}
     for name, row in rows.items():
         found.setdefault(name, []).append(np.array(row))
 np.savez(path, **{name: np.stack(rows) for name, rows in found.items()})
@@ -76,7 +79,7 @@ def difference(here: dict[str, np.ndarray], there: dict[str, np.ndarray]) -> flo
             return float("inf")
         # Equal infinities and nans are no difference.
         same = (mine == other) | ((mine != mine) & (other != other))
-        gap = np.abs(mine.astype(float) - other.astype(float))[~same]
+        gap = np.abs(mine[~same].astype(float) - other[~same].astype(float))
         worst = max(worst, float(np.nan_to_num(gap, nan=np.inf).max(initial=0.0)))
     return worst
 
@@ -91,7 +94,7 @@ def main(checkout: Path, only: str = "") -> None:
             for profile in PROFILES:
                 one, two = (play(t, scenario, backend, profile) for t in trees)
                 gap = difference(one, two)
-                wrong += gap > tolerance
+                wrong += gap > max(tolerance, ON_PURPOSE.get(scenario, 0.0))
                 cells.append("same bits" if gap == 0.0 else f"{gap:.1e}")
         table.add_row(scenario, *cells)
     Console(width=100).print(table)

@@ -39,7 +39,7 @@ def count(*after):
 def test_a_touch_counts_once():
     memory = count(state(DT, 1, 0.02), state(2 * DT))
     assert memory["touches"].item() == 1
-    assert memory["met"].item()
+    assert memory["any_touch"].item()
     assert memory["apart"].item() == 2 * DT - 0.02
 
 
