@@ -65,7 +65,7 @@ class ObservationContext:
         """True if there is one seat and its ego frame is the table frame."""
         return len(self.rotations) == 1 and bool(self.rotations[0, 0, 0] == 1.0)
 
-    def place(
+    def position_columns(
         self, name: str, unit: tuple[float, float], x: float = 0.0
     ) -> list[Column]:
         """Return the columns of a position, centred at (x, 0)."""
@@ -75,7 +75,7 @@ class ObservationContext:
             Column(f"{name}.y", -ey, ey, unit[1]),
         ]
 
-    def gap(self, name: str, unit: tuple[float, float]) -> list[Column]:
+    def offset_columns(self, name: str, unit: tuple[float, float]) -> list[Column]:
         """Return the columns of the offset from one position to another."""
         ex, ey = 2 * self.extent
         return [
@@ -83,7 +83,7 @@ class ObservationContext:
             Column(f"{name}.dy", -ey, ey, unit[1]),
         ]
 
-    def motion(self, name: str, most: float, unit: float) -> list[Column]:
+    def velocity_columns(self, name: str, most: float, unit: float) -> list[Column]:
         """Return the columns of a velocity."""
         return [Column(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
 

@@ -28,9 +28,9 @@ class OwnPaddle(Observable):
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         centre = float(np.mean([x for x, _ in scope.scene.seats[0].reach]))
-        return scope.place("own", (0.2, 0.2), centre) + scope.motion(
-            "own", scope.top_speed, scope.top_speed
-        )
+        return scope.position_columns(
+            "own", (0.2, 0.2), centre
+        ) + scope.velocity_columns("own", scope.top_speed, scope.top_speed)
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[..., :2] = ego.own
@@ -44,8 +44,10 @@ class OtherPaddles(Observable):
     def columns(self, scope: ObservationContext) -> list[Column]:
         columns = []
         for i in range(len(scope.scene.seats) - 1):
-            columns += scope.place(f"other_{i}", (0.5, 0.2))
-            columns += scope.motion(f"other_{i}", scope.top_speed, scope.top_speed)
+            columns += scope.position_columns(f"other_{i}", (0.5, 0.2))
+            columns += scope.velocity_columns(
+                f"other_{i}", scope.top_speed, scope.top_speed
+            )
         return columns
 
     def write(self, ego: EgoView, out: Array) -> None:
@@ -83,11 +85,11 @@ class Pucks(Observable):
         columns: list[Column] = []
         for i in range(scope.scene.pucks):
             if scope.observe == "velocity":
-                columns += scope.place(f"puck_{i}", (0.67, 0.25))
-                columns += scope.motion(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
+                columns += scope.position_columns(f"puck_{i}", (0.67, 0.25))
+                columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
             else:
                 for ago in range(HISTORY - 1, -1, -1):
-                    columns += scope.place(f"puck_{i}[-{ago}]", (0.67, 0.25))
+                    columns += scope.position_columns(f"puck_{i}[-{ago}]", (0.67, 0.25))
                     columns.append(Column(f"puck_{i}[-{ago}].seen", 0.0, 1.0, 1.0))
         return columns
 
@@ -111,7 +113,7 @@ class OwnToPucks(Observable):
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"own_to_puck_{i}" for i in range(scope.scene.pucks)]
-        return [c for name in names for c in scope.gap(name, (0.25, 0.125))]
+        return [c for name in names for c in scope.offset_columns(name, (0.25, 0.125))]
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[...] = (ego.puck - ego.own[..., None, :]).reshape(out.shape)
@@ -126,7 +128,11 @@ class Blocks(Observable):
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"block_{i}" for i in range(scope.scene.blocks)]
-        return [c for name in names for c in scope.place(name, (0.3, 0.2), self.x)]
+        return [
+            c
+            for name in names
+            for c in scope.position_columns(name, (0.3, 0.2), self.x)
+        ]
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[...] = ego.rotate(ego.state.block).reshape(out.shape)
@@ -138,7 +144,7 @@ class PuckToBlocks(Observable):
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"puck_0_to_block_{i}" for i in range(scope.scene.blocks)]
-        return [c for name in names for c in scope.gap(name, (1.0, 0.5))]
+        return [c for name in names for c in scope.offset_columns(name, (1.0, 0.5))]
 
     def write(self, ego: EgoView, out: Array) -> None:
         gap = ego.rotate(ego.state.block) - ego.puck[..., :1, :]
@@ -170,7 +176,7 @@ class Goal(Observable):
     goal = True
 
     def columns(self, scope: ObservationContext) -> list[Column]:
-        return scope.place("goal", self.unit, self.x) + scope.gap(
+        return scope.position_columns("goal", self.unit, self.x) + scope.offset_columns(
             f"{self.origin}_to_goal", self.unit
         )
 
@@ -189,7 +195,7 @@ class GoalVelocity(Observable):
     goal = True
 
     def columns(self, scope: ObservationContext) -> list[Column]:
-        return scope.motion("goal", self.most, self.unit)
+        return scope.velocity_columns("goal", self.most, self.unit)
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[...] = ego.rotate(ego.memory["goal_velocity"][..., None, :])[..., 0, :]

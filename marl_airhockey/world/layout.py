@@ -18,17 +18,17 @@ class ObservationLayout:
     """Observables side by side: bounds, labels, and the numbers of an ego view."""
 
     def __init__(
-        self, pieces: tuple[Observable, ...], scope: ObservationContext
+        self, observables: tuple[Observable, ...], scope: ObservationContext
     ) -> None:
         if scope.observe not in OBSERVE:
             raise ValueError(unknown_name("observe", scope.observe, OBSERVE))
         self.scope = scope
-        columns = [piece.columns(scope) for piece in pieces]
+        columns = [observable.columns(scope) for observable in observables]
         ends = np.cumsum([len(c) for c in columns]).tolist()
         starts = [0, *ends[:-1]]
         self._parts = [
-            (piece, slice(a, b))
-            for piece, a, b in zip(pieces, starts, ends, strict=True)
+            (observable, slice(a, b))
+            for observable, a, b in zip(observables, starts, ends, strict=True)
         ]
         flat = [column for part in columns for column in part]
         self.labels = tuple(column.label for column in flat)
@@ -42,7 +42,7 @@ class ObservationLayout:
         seats = len(self.scope.scene.seats)
         shape = (*ego.state.time.shape, seats, len(self.labels))
         out = np.empty_like(ego.state.position, shape=shape)
-        for piece, part in self._parts:
-            piece.write(ego, out[..., part])
+        for observable, part in self._parts:
+            observable.write(ego, out[..., part])
         inside = np.minimum(np.maximum(out, self.low), self.high)
         return inside.astype(np.float32)

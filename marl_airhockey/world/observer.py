@@ -56,10 +56,10 @@ class Observer:
             form = "velocity" if observe == "pixels" else observe
             scope = ObservationContext(self.scenario.scene, form, self._top_speed)
             apart = self.scenario.goals == "dict"
-            pieces = tuple(
+            observables = tuple(
                 p for p in self.scenario.observation if not (apart and p.goal)
             )
-            self._layouts[observe] = layout = ObservationLayout(pieces, scope)
+            self._layouts[observe] = layout = ObservationLayout(observables, scope)
             self._shows[observe] = self._compiled(layout)
         return self._layouts[observe]
 
