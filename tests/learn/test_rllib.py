@@ -11,7 +11,7 @@ import sys
 import time
 
 import pytest
-from test_tutorials import run
+from tutorials import run
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
