@@ -111,7 +111,7 @@ def test_what_one_team_wins_the_other_loses(name, backend):
 
 
 @pytest.mark.parametrize("sides", [3, 4, 5])
-def test_lives_are_lost_goals_shut_and_the_last_one_wins(backend, sides):
+def test_lives_are_lost_goals_close_and_the_last_one_wins(backend, sides):
     options = {"sides": sides, "lives": 2}
     world = ah.make_world("free_for_all", 3, backend=backend, options=options)
     world.autoreset = False
@@ -149,7 +149,7 @@ def test_a_goal_pays_who_touched_the_puck_last(backend):
     assert total.tolist() == [[1.0, 0.0, -1.0, 0.0]] * 2
 
 
-def test_a_rally_counts_crossings_by_turns(backend):
+def test_a_rally_counts_alternating_crossings(backend):
     world = ah.make_world("rally", 2, backend=backend)
     world.autoreset = False
     world.reset(0)
@@ -164,7 +164,7 @@ def test_a_rally_counts_crossings_by_turns(backend):
     assert idle(world, 0.05)[0].terminated.all()
 
 
-def test_mates_are_paid_for_striking_in_turn(backend):
+def test_mates_are_paid_for_striking_alternately(backend):
     world = ah.make_world("team_juggle", 2, backend=backend)
     world.autoreset = False
     world.reset(0)
