@@ -43,7 +43,7 @@ $(FAR)/.ready: pyproject.toml constraints.txt
 	touch $@
 
 test-distributed: $(FAR)/.ready ## Run the tests of RLlib, in an environment of their own
-	$(FAR)/bin/pytest -W ignore tests/test_distributed.py
+	$(FAR)/bin/pytest -W ignore tests/learn/test_rllib.py
 
 lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .

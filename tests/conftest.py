@@ -1,4 +1,4 @@
-import importlib
+import importlib.util
 import os
 import shutil
 
@@ -37,9 +37,29 @@ def pytest_generate_tests(metafunc):
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_thread():
-    import torch
+    if importlib.util.find_spec("torch"):
+        import torch
 
-    torch.set_num_threads(1)
+        torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session")
+def touch_run(tmp_path_factory):
+    """The folder of a run that has learned to touch the puck."""
+    from runs import SMALL
+
+    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.train import train
+
+    folder = tmp_path_factory.mktemp("run") / "touch-0"
+    seen = []
+    train(
+        preset("touch", {**SMALL, "total_steps": 98_304}),
+        folder,
+        lambda done, total, row: seen.append((done, total)),
+    )
+    assert seen[-1][0] <= seen[-1][1]
+    return folder
 
 
 @pytest.fixture(scope="module")

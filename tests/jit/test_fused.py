@@ -14,13 +14,13 @@ def many_operations(source, other):
     x, n, flag = source["x"], source["n"], source["flag"]
     y = np.where(flag[..., None], x, np.sqrt(np.abs(x)))
     y[..., 0] = np.clip(x[..., 1], -0.5, 0.5)
-    turned = (other["turn"] @ x[..., None, :, None])[..., 0]
+    rotated = (other["rotation"] @ x[..., None, :, None])[..., 0]
     seen = (x > 0) & ~flag[..., None]
     seen |= n[..., None] > 3
     return (
         {
             "y": np.exp(-y) / (1.0 + x * x),
-            "turned": turned,
+            "rotated": rotated,
             "count": seen.sum(-1) + n,
             "any": seen.any(-1),
             "least": np.fmin.reduce(x, axis=-1),
@@ -41,7 +41,7 @@ def sources(worlds, seed=0):
     }
     first["x"][0, 1] = np.inf
     kept = rng.normal(size=(worlds, 2))
-    return first, {"kept": kept, "turn": rng.normal(size=(worlds, 4, 3, 3))}
+    return first, {"kept": kept, "rotation": rng.normal(size=(worlds, 4, 3, 3))}
 
 
 @pytest.mark.parametrize("worlds", [1, 7])

@@ -41,7 +41,7 @@ def test_a_human_window_opens_and_closes():
     env.close()
 
 
-def test_a_square_block_is_drawn_turned():
+def test_a_square_block_is_drawn_rotated():
     env = ah.parallel_env("move_block", backend="pymunk", options={"shape": "square"})
     env.reset(seed=0)
     state = env.world.state.map(lambda x: x[0].copy())

@@ -42,7 +42,7 @@ def test_it_plays_both_ends_alike(agent):
         worlds[me] = ah.make_world(Pair(), 3, drivers=drivers)
         worlds[me].reset(1)
     near, far = worlds[0], worlds[1]
-    # Turn the far world's start by half a turn; seats then swap.
+    # Rotate the far world's start by 180 degrees; seats then swap.
     flipped, everywhere = near.state, np.arange(3)
     for name in ("position", "velocity"):
         getattr(flipped, name)[:] = -getattr(near.state, name)[:, [1, 0, 2]]
@@ -94,7 +94,7 @@ def test_a_driver_keeps_its_own_pace():
         ah.make_world("reach", 2, drivers={"paddle_0": driver})
 
 
-def test_a_told_paddle_follows_its_driver():
+def test_a_prescribed_paddle_follows_its_driver():
     class Hand(type(ah.make_agent("still"))):
         def measured(self):
             return np.array([[-0.5, 0.1, 0.2, 0.0]])
@@ -103,7 +103,7 @@ def test_a_told_paddle_follows_its_driver():
     world.reset(0)
     world.step(np.zeros((1, 1, 2)))
     np.testing.assert_allclose(world.command[0, 1], [-0.2, 0.0], atol=1e-12)
-    # Told in the ego frame of the far seat: half a turn from the table's.
+    # Prescribed in the ego frame of the far seat, 180 degrees from the table's.
     np.testing.assert_allclose(world.state.paddle[0, 1], [0.5, -0.1], atol=1e-12)
     np.testing.assert_allclose(
         world.state.paddle_velocity[0, 1], [-0.2, 0.0], atol=1e-12

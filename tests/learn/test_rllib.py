@@ -11,7 +11,7 @@ import sys
 import time
 
 import pytest
-from test_tutorials import run
+from tutorials import run
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
@@ -53,8 +53,8 @@ def test_it_learns_and_its_policy_drives_without_ray(tmp_path):
         "assert 'ray' not in sys.modules and 'torch' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-    frozen = export_policy(folder, tmp_path / "touch.npz")
-    assert "engine" in frozen.card["command"]
+    exported = export_policy(folder, tmp_path / "touch.npz")
+    assert "engine" in exported.card["command"]
 
 
 def test_self_play_goes_on_when_a_runner_is_killed(tmp_path):

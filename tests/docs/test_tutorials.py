@@ -1,20 +1,9 @@
 """The tutorial scripts run as their pages say."""
 
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[1]
-
-
-def run(script, *options):
-    command = [sys.executable, "-W", "ignore", str(ROOT / "scripts" / script), *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout
+from tutorials import run
 
 
 @pytest.mark.slow

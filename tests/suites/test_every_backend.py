@@ -161,7 +161,7 @@ def test_obstacles_are_solid(backend):
     np.testing.assert_array_equal(last.position[0, -1], [0.2, 0.0])
 
 
-def test_a_told_paddle_goes_where_it_is_told_and_too_fast_is_lifted(backend):
+def test_a_prescribed_paddle_follows_and_too_fast_is_lifted(backend):
     bench = Bench(backend)
     bench.reset((-0.6, 0.0), (-0.5, 0.0, 0.0, 0.0))
     prescribed = np.array([[[-0.55, 0.02, 0.3, 0.1]]])

@@ -135,7 +135,7 @@ def test_stepping_before_a_reset_and_after_the_end():
         env.render()
 
 
-def test_a_cast_that_a_backend_cannot_play_is_refused_with_the_reason(backend):
+def test_a_scene_that_a_backend_cannot_play_is_refused_with_the_reason(backend):
     class BlocksAndMouths(Pair):
         @cached_property
         def scene(self):

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 import marl_airhockey as ah
-from marl_airhockey.jit.codegen import load
-from marl_airhockey.jit.pipeline import Fixed, Pipeline, Stage
 
 GAMES = [
     ("juggle", {}),
@@ -106,22 +104,3 @@ def test_an_action_that_is_not_finite_moves_nothing():
         world.step(bad)
     np.testing.assert_array_equal(world.state.position, before)
     world.step(actions)
-
-
-def test_a_pipeline_calls_its_stages_until_one_stops_it():
-    source = (
-        "import numpy as np\n"
-        "SIGNATURE = 'boolean(float64[:, ::1], float64[::1], float64)'\n"
-        "def kernel(x, limit, add):\n"
-        "    x += add\n"
-        "    return x.max() < limit[0]\n"
-    )
-    add = load(source, "a test").kernel
-    x, limit = np.zeros((4, 2)), np.full(1, 2.5)
-    first = Stage(add, (x, Fixed(limit), 1.0), stops=True)
-    pipeline = Pipeline(4, [first, Stage(add, (x, Fixed(limit), 0.25))], "a test")
-    assert pipeline()
-    np.testing.assert_array_equal(x, 1.25)
-    assert pipeline()
-    assert not pipeline()
-    np.testing.assert_array_equal(x, 3.5)

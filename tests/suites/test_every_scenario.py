@@ -1,8 +1,10 @@
 """What every scenario owes, on every backend; found by folder, listed nowhere."""
 
+import inspect
 import subprocess
 import sys
 import types
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -18,6 +20,7 @@ from pettingzoo.test import (
     state_test,
 )
 from pettingzoo.utils.conversions import parallel_to_aec
+from rollout import rollout
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
@@ -32,20 +35,6 @@ def alone(scenario):
     """Keywords that leave one seat open."""
     others = range(1, len(ah.make_scenario(scenario).scene.seats))
     return {"drivers": {f"paddle_{i}": "sticky" for i in others}}
-
-
-def rollout(world, steps, seed, policy_seed=0):
-    """Observations, rewards and dones of random actions, stacked."""
-    rng = np.random.default_rng(policy_seed)
-    seen = [world.reset(seed)]
-    rewards, dones = [], []
-    shape = (world.num_worlds, len(world.open), 2)
-    for _ in range(steps):
-        step = world.step(rng.uniform(-1, 1, shape))
-        seen.append(step.observation)
-        rewards.append(step.reward)
-        dones.append(step.terminated | step.truncated)
-    return np.array(seen), np.array(rewards), np.array(dones)
 
 
 def test_pettingzoo_parallel_api(scenario, backend):
@@ -103,13 +92,13 @@ def test_the_same_seed_gives_the_same_episodes_in_another_process(scenario, back
     program = (
         "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
         "import marl_airhockey as ah\n"
-        "from test_every_scenario import rollout\n"
+        "from rollout import rollout\n"
         "w = ah.make_world(sys.argv[2], 3, backend=sys.argv[3])\n"
         "parts = rollout(w, 150, 7)\n"
         "print(hashlib.sha256(b''.join(p.tobytes() for p in parts)).hexdigest())\n"
     )
-    here = __file__.rpartition("/")[0]
-    command = [sys.executable, "-c", program, here, scenario, backend]
+    helpers = str(Path(inspect.getfile(rollout)).parent)
+    command = [sys.executable, "-c", program, helpers, scenario, backend]
     runs = [
         subprocess.run(command, capture_output=True, text=True, check=True).stdout
         for _ in range(2)

@@ -69,7 +69,7 @@ def test_compute_reward_is_vectorised(goal_scenario):
     assert env.compute_reward(goals[0, 0], goals[0, 0], {}).shape == ()
 
 
-def test_sac_with_her_runs_on_the_batched_environment():
+def test_sac_with_her_trains_on_a_vector_environment():
     venv = ah.make_sb3_vec("reach", 4, goals="dict")
     model = SAC(
         "MultiInputPolicy",

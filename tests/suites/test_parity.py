@@ -1,4 +1,4 @@
-"""The batched backend does what pymunk does, from the same start."""
+"""The numba backend does what pymunk does, from the same start."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from marl_airhockey.registry import find_backend
 
 TABLE = TABLES["standard"]
 DT = 0.05
-RNG = np.random.default_rng(0)
 PADDLE, PUCK = TABLE.paddle_radius, TABLE.puck_radius
 
 
@@ -50,14 +49,14 @@ def table_with(**options):
     return Scene(TABLE, (make_seat("robot", TABLE, 0),), **{"pucks": 1} | options)
 
 
-def same_outcome(pymunk, batched, share=0.02, least=0.05):
+def same_outcome(pymunk, numba, share=0.02, least=0.05):
     """Velocities at the end within a share of the speeds; blocks' places too."""
-    a, b = pymunk[-1], batched[-1]
+    a, b = pymunk[-1], numba[-1]
     speed = np.linalg.norm(a.velocity, axis=-1).max(-1)
     error = np.linalg.norm(a.velocity - b.velocity, axis=-1).max(-1)
     assert (error <= share * np.maximum(speed, least)).all(), error.max()
     touches = [
-        np.sum([s.touched for s in states], axis=0) for states in (pymunk, batched)
+        np.sum([s.touched for s in states], axis=0) for states in (pymunk, numba)
     ]
     np.testing.assert_array_equal(*touches)
 
@@ -68,13 +67,14 @@ def polar(speed, angle):
 
 @pytest.mark.parametrize(("tilt", "damping"), [(0.0, 0.0), (5.5, 0.15), (9.0, 0.8)])
 def test_free_flight_and_banks_agree_to_a_millimetre_over_two_seconds(tilt, damping):
+    rng = np.random.default_rng(0)
     worlds = 200
     rows = bodies(
         worlds,
         np.concatenate(
             [
-                RNG.uniform((-0.2, -0.25), (0.7, 0.25), (worlds, 2)),
-                RNG.uniform(-1.5, 1.5, (worlds, 2)),
+                rng.uniform((-0.2, -0.25), (0.7, 0.25), (worlds, 2)),
+                rng.uniform(-1.5, 1.5, (worlds, 2)),
             ],
             -1,
         ),
@@ -90,83 +90,90 @@ def test_free_flight_and_banks_agree_to_a_millimetre_over_two_seconds(tilt, damp
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_a_puck_and_a_paddle_at_all_angles_and_speeds(moving):
+    rng = np.random.default_rng(0)
     worlds = 500
-    angle, off = RNG.uniform(0, 2 * np.pi, worlds), RNG.uniform(-0.99, 0.99, worlds)
-    speed = RNG.uniform(0.3, 4.5, worlds)
+    angle, off = rng.uniform(0, 2 * np.pi, worlds), rng.uniform(-0.99, 0.99, worlds)
+    speed = rng.uniform(0.3, 4.5, worlds)
     away, aside = polar(1.0, angle), polar(1.0, angle + np.pi / 2)
     start = (off * (PADDLE + PUCK))[:, None] * aside - 0.1 * away
     rows = bodies(worlds, np.concatenate([start, polar(speed, angle)], -1))
     rows[:, 0, :2] = 0.0
     command = np.zeros((worlds, 1, 2))
     if moving:
-        pace = RNG.uniform(0, 0.35, worlds)
-        command[:, 0] = polar(pace, RNG.uniform(0, 2 * np.pi, worlds))
-    pymunk, batched = play(table_with(), rows, 0.35, command)
+        pace = rng.uniform(0, 0.35, worlds)
+        command[:, 0] = polar(pace, rng.uniform(0, 2 * np.pi, worlds))
+    pymunk, numba = play(table_with(), rows, 0.35, command)
     assert np.mean(np.any([s.touched.any((1, 2)) for s in pymunk], axis=0)) > 0.8
-    same_outcome(pymunk, batched)
+    same_outcome(pymunk, numba)
 
 
 def test_a_puck_strikes_a_block_head_on_and_glancing():
+    rng = np.random.default_rng(0)
     worlds, reach = 300, PUCK + 0.0377
-    off = RNG.uniform(-0.99, 0.99, worlds)
+    off = rng.uniform(-0.99, 0.99, worlds)
     puck = np.zeros((worlds, 4))
-    puck[:, 1], puck[:, 2] = off * reach, RNG.uniform(0.3, 4.0, worlds)
+    puck[:, 1], puck[:, 2] = off * reach, rng.uniform(0.3, 4.0, worlds)
     puck[:, 0] = -np.sqrt(reach**2 - puck[:, 1] ** 2) - 0.003
     rows = bodies(worlds, puck, (0.0, 0.0, 0.0, 0.0))
-    pymunk, batched = play(table_with(blocks=1), rows, 0.05)
+    pymunk, numba = play(table_with(blocks=1), rows, 0.05)
     assert (np.linalg.norm(pymunk[-1].block_velocity, axis=-1) > 0).mean() > 0.9
-    same_outcome(pymunk, batched)
+    same_outcome(pymunk, numba)
 
 
 def test_two_pucks_meet():
+    rng = np.random.default_rng(0)
     worlds = 300
-    off = RNG.uniform(-0.99, 0.99, worlds)
+    off = rng.uniform(-0.99, 0.99, worlds)
     first, second = np.zeros((2, worlds, 4))
-    first[:, 1], first[:, 2] = off * 2 * PUCK, RNG.uniform(0.3, 3.0, worlds)
-    second[:, 0], second[:, 2] = 0.15, RNG.uniform(-2.0, 0.2, worlds)
+    first[:, 1], first[:, 2] = off * 2 * PUCK, rng.uniform(0.3, 3.0, worlds)
+    second[:, 0], second[:, 2] = 0.15, rng.uniform(-2.0, 0.2, worlds)
     rows = bodies(worlds, first, second)
     same_outcome(*play(table_with(pucks=2), rows, 0.2))
 
 
 def test_a_puck_in_a_corner():
+    rng = np.random.default_rng(0)
     worlds = 200
-    angle, speed = RNG.uniform(0.05, 1.52, worlds), RNG.uniform(0.3, 4.0, worlds)
-    start = np.array([0.75, 0.22]) + RNG.uniform(-0.03, 0.03, (worlds, 2))
+    angle, speed = rng.uniform(0.05, 1.52, worlds), rng.uniform(0.3, 4.0, worlds)
+    start = np.array([0.75, 0.22]) + rng.uniform(-0.03, 0.03, (worlds, 2))
     rows = bodies(worlds, np.concatenate([start, polar(speed, angle)], -1))
     same_outcome(*play(table_with(), rows, 0.3))
 
 
 def test_a_puck_at_a_goal_post_and_through_the_mouth():
+    rng = np.random.default_rng(0)
     worlds = 400
     goal = table_with(goal_lines=(GoalLine("far", 2, 0.30), GoalLine("home", 0)))
     puck = np.zeros((worlds, 4))
-    puck[:, 0], puck[:, 1] = 0.65, RNG.uniform(0.10, 0.20, worlds)
-    puck[:, 2], puck[:, 3] = RNG.uniform(0.8, 3.0, worlds), RNG.uniform(-1, 1, worlds)
-    pymunk, batched = play(goal, bodies(worlds, puck), 0.3)
+    puck[:, 0], puck[:, 1] = 0.65, rng.uniform(0.10, 0.20, worlds)
+    puck[:, 2], puck[:, 3] = rng.uniform(0.8, 3.0, worlds), rng.uniform(-1, 1, worlds)
+    pymunk, numba = play(goal, bodies(worlds, puck), 0.3)
     crossed = [
         np.any([s.crossed[:, 0, 0] for s in states], axis=0)
-        for states in (pymunk, batched)
+        for states in (pymunk, numba)
     ]
     np.testing.assert_array_equal(*crossed)
     assert 0.2 < crossed[0].mean() < 0.9
-    same_outcome(pymunk, batched)
+    same_outcome(pymunk, numba)
 
 
 def test_a_puck_at_obstacles():
+    rng = np.random.default_rng(0)
     worlds = 300
     posts = (Obstacle((0.2, 0.05), 0.05), Obstacle((0.1, -0.2), 0.01, (0.3, -0.1)))
     puck = np.zeros((worlds, 4))
-    puck[:, 1], puck[:, 2] = RNG.uniform(-0.25, 0.25, worlds), 1.5
+    puck[:, 1], puck[:, 2] = rng.uniform(-0.25, 0.25, worlds), 1.5
     same_outcome(*play(table_with(obstacles=posts), bodies(worlds, puck), 0.25))
 
 
 def test_a_puck_on_a_pentagon_away_from_its_corners():
+    rng = np.random.default_rng(0)
     worlds, table = 300, Table.regular(5, 0.45)
     pentagon = Scene(table, (make_seat("arcade", table, 0, (1,)),), pucks=1)
     puck = np.zeros((worlds, 4))
-    side = RNG.integers(1, 5, worlds)
+    side = rng.integers(1, 5, worlds)
     out = -table.normals[side]
-    puck[:, 2:] = 1.2 * out + RNG.uniform(-0.4, 0.4, worlds)[:, None] * np.stack(
+    puck[:, 2:] = 1.2 * out + rng.uniform(-0.4, 0.4, worlds)[:, None] * np.stack(
         [-out[:, 1], out[:, 0]], -1
     )
     rows = bodies(worlds, puck)

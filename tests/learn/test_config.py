@@ -1,0 +1,31 @@
+"""Presets and settings of training."""
+
+import pytest
+
+from marl_airhockey.learn.config import load_config, preset
+
+
+def test_presets_are_whole_and_bad_settings_are_named(scenario):
+    config = preset(scenario, {"seed": 3})
+    assert config.total_steps > 0
+    assert config.seed == 3
+    with pytest.raises(ValueError, match="there are: gamma"):
+        preset(scenario, {"gama": 0.9})
+    with pytest.raises(ValueError, match="num_worlds"):
+        preset(scenario, {"num_worlds": 0})
+    with pytest.raises(ValueError, match="batch_size"):
+        preset(scenario, {"num_worlds": 3})
+    with pytest.raises(ValueError, match="learning_rate"):
+        preset(scenario, {"learning_rate": "fast"})
+
+
+def test_a_configuration_survives_its_file(tmp_path):
+    changes = {"options": {"pucks": 2}, "profile": "robot", "hidden": [32]}
+    config = preset("juggle", changes)
+    assert config.observe == "history"
+    path = tmp_path / "config.toml"
+    path.write_text(config.to_toml())
+    assert load_config(path) == config
+    path.write_text("nothing = 1")
+    with pytest.raises(ValueError, match="no training configuration"):
+        load_config(path)

@@ -1,0 +1,118 @@
+"""Runs of training: what they leave, resuming, refusals."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+from runs import SMALL, rows
+
+import marl_airhockey as ah
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.learn.best_response import best_response
+from marl_airhockey.learn.config import TrainConfig, preset
+from marl_airhockey.learn.export import export_policy
+from marl_airhockey.learn.train import train
+from marl_airhockey.toolkit.policies import RUN_FORMAT, load_policy
+from marl_airhockey.transfer.measure import fine_tuning_config
+
+
+@pytest.mark.parametrize("found", [1, 99])
+def test_a_run_of_another_format_is_refused(tmp_path, found):
+    folder = tmp_path / "old"
+    folder.mkdir()
+    for name in ("last.zip", "state.json"):
+        (folder / name).touch()
+    first, _, settings = preset("duel", SMALL).to_toml().partition("\n")
+    assert first == f"format = {RUN_FORMAT}"
+    # The first runs had no number.
+    number = "" if found == 1 else f"format = {found}\n"
+    (folder / "config.toml").write_text(number + settings)
+    fresh = preset("duel", {**SMALL, "init": str(folder)})
+    for use in (
+        lambda: train(None, folder),
+        lambda: train(fresh, tmp_path / "fresh"),
+        lambda: export_policy(folder, tmp_path / "policy.npz"),
+        lambda: fine_tuning_config(folder, 64),
+        lambda: best_response("duel", "still", 64, folder),
+    ):
+        with pytest.raises(ValueError, match=f"another version .*format {found}"):
+            use()
+    assert not (tmp_path / "policy.npz").exists()
+
+
+def test_a_run_leaves_all_that_is_needed(touch_run):
+    names = {p.name for p in touch_run.iterdir()}
+    assert names >= {
+        "config.toml",
+        "versions.json",
+        "progress.csv",
+        "evaluations.csv",
+        "best.zip",
+        "last.zip",
+        "state.json",
+    }
+    assert any("tfevents" in name for name in names)
+    versions = json.loads((touch_run / "versions.json").read_text())
+    assert versions["torch"] == torch.__version__
+    assert versions["git"]
+    table = rows(touch_run)
+    assert int(table[-1]["steps"]) == 98_304
+    with (touch_run / "progress.csv").open() as file:
+        header = file.readline()
+    assert "reward/touch" in header
+    assert "eval/success" in header
+
+
+def test_it_learned_to_touch(touch_run):
+    learned = evaluate(load_policy(touch_run), "learned", "touch", 200)
+    still = evaluate(ah.make_agent("still"), "still", "touch", 200)
+    assert learned.success > still.success + 0.3
+
+
+def test_a_finished_run_is_not_overwritten(touch_run):
+    with pytest.raises(ValueError, match="holds a run already"):
+        train(preset("touch", SMALL), touch_run)
+    steps = rows(touch_run)[-1]["steps"]
+    assert int(train(None, touch_run)["steps"]) == int(steps)
+
+
+def test_a_killed_run_goes_on_where_it_stood(tmp_path):
+    folder = tmp_path / "killed"
+    command = [sys.executable, "-m", "marl_airhockey.cli", "train", "touch"]
+    command += ["--out", str(folder), "--steps", "200000", "--set", "num_worlds=32"]
+    for setting in ("batch_size=256", "evaluations=25", "eval_episodes=5"):
+        command += ["--set", setting]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    state = folder / "state.json"
+    deadline = time.monotonic() + 120
+    while not state.exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    stood = json.loads(state.read_text())["steps"]
+    assert 0 < stood < 200_000
+    again = ["--resume", str(folder), "--json"]
+    out = subprocess.run(
+        [*command[:4], *again], capture_output=True, text=True, check=True
+    )
+    last = json.loads(out.stdout)
+    assert last["steps"] >= 200_000
+    steps = [int(row["steps"]) for row in rows(folder)]
+    assert steps == sorted(steps)
+    assert stood in steps
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "task", ["reach", "touch", "strike", "juggle", "puck_velocity"]
+)
+def test_presets_learn_their_tasks(task, tmp_path):
+    config = preset(task)
+    assert isinstance(config, TrainConfig)
+    row = train(config, tmp_path / task)
+    assert row["success"] >= 0.9

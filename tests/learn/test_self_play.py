@@ -1,0 +1,74 @@
+"""Learning against others and earlier selves."""
+
+import numpy as np
+from runs import SMALL, rows
+
+import marl_airhockey as ah
+from marl_airhockey.evaluation.league import find_policies
+from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.self_play import make_training_env
+from marl_airhockey.learn.train import train
+from marl_airhockey.toolkit.policies import load_policy
+
+GAME = {**SMALL, "num_worlds": 32, "batch_size": 256, "n_steps": 16, "snapshots": 4}
+GAME |= {"options": {"seconds": 3.0}, "eval_episodes": 4, "pool": 2, "mirror": 0.5}
+GAME |= {"total_steps": 6144, "opponents": ["random", "goalkeeper"]}
+
+
+def training_env(folder, **changes):
+    config = preset("doubles", {**GAME, **changes})
+    return config, make_training_env(config, config.num_worlds, folder)
+
+
+def test_learners_and_opponents_share_an_environment(tmp_path):
+    _, env = training_env(tmp_path)
+    assert env.num_envs == 16 * 4 + 16 * 2
+    seen = env.reset()
+    assert seen.shape == (env.num_envs, env.observation_space.shape[0])
+    seated = env._roster.seated
+    assert (seated[:16] == -1).all()
+    assert ((seated[16:] == -1).sum(-1) == 2).all(), "a team of the learner's"
+    sides = [set(np.flatnonzero(row == -1)) for row in seated[16:]]
+    assert {0, 1} in sides
+    assert {2, 3} in sides
+    rng = np.random.default_rng(0)
+    for _ in range(130):
+        world = env.world.observer.read(
+            env.world.sensed, env.world.memory, np.arange(4)
+        )
+        np.testing.assert_array_equal(seen, world[env._rows, env._seats])
+        actions = rng.uniform(-1, 1, (env.num_envs, 2)).astype(np.float32)
+        seen, reward, done, infos = env.step(actions)
+        for i in np.flatnonzero(done):
+            assert infos[i]["terminal_observation"].shape == seen[i].shape
+        assert reward.shape == done.shape == (env.num_envs,)
+    assert set(env.scores) == {"random", "goalkeeper"}
+    assert env.scores["random"] != 0.5
+
+
+def test_hard_opponents_come_more_often(tmp_path):
+    _, env = training_env(tmp_path, opponents=["random", "goalkeeper"])
+    env._scores[:] = 0.95, 0.2
+    drawn = np.bincount(env._draw(4000), minlength=2) / 4000
+    assert drawn[1] > 0.9
+
+
+def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
+    folder = tmp_path / "run"
+    config = preset("duel", GAME)
+    assert config.self_play
+    last = train(config, folder)
+    assert set(last) >= {"score", "score/random", "return"}
+    assert len(rows(folder)) >= 2
+    assert len(list((folder / "pool").glob("*.npz"))) == 2
+    past = sorted((folder / "checkpoints").glob("*.npz"))
+    assert len(past) >= 2
+    policy, old = load_policy(folder / "last.zip"), load_policy(past[-1])
+    world = ah.make_world("duel", 8, backend="numba")
+    seen = world.reset(0)[:, 0]
+    same = policy.predict(seen, True), old.predict(seen, True)
+    np.testing.assert_allclose(*(np.clip(x, -1, 1) for x in same), atol=1e-5)
+    text = (folder / "config.toml").read_text().replace("= 6144", "= 9216")
+    (folder / "config.toml").write_text(text)
+    assert train(None, folder)["steps"] > last["steps"]
+    assert find_policies(tmp_path) == [str(folder)]

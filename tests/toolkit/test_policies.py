@@ -1,0 +1,99 @@
+"""Policies of all kinds as drivers."""
+
+import numpy as np
+import onnx
+import pytest
+from runs import SMALL
+from stable_baselines3 import PPO, SAC
+
+import marl_airhockey as ah
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.sb3 import build_model
+from marl_airhockey.registry import make_agent
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.policies import RUN_FORMAT, load_policy
+
+
+def test_a_policy_plays_the_same_deterministically_and_samples_otherwise(touch_run):
+    mean = evaluate(load_policy(touch_run), "mean", "touch", 40)
+    again = evaluate(load_policy(touch_run), "mean", "touch", 40)
+    assert mean.returns == again.returns
+    sampled = load_policy(touch_run / "best.zip", deterministic=False)
+    assert evaluate(sampled, "sampled", "touch", 40).returns != mean.returns
+
+
+def test_a_policy_of_another_scenario_is_refused(touch_run):
+    with pytest.raises(ValueError, match="expects observations of shape"):
+        evaluate(load_policy(touch_run), "learned", "juggle", 2)
+
+
+def test_any_sb3_zip_whose_spaces_fit_drives(tmp_path):
+    env = ah.make_sb3_vec("reach", 2)
+    for kind, extra in ((PPO, {"n_steps": 8, "batch_size": 16}), (SAC, {})):
+        path = tmp_path / f"{kind.__name__}.zip"
+        kind("MlpPolicy", env, policy_kwargs={"net_arch": [8]}, **extra).save(path)
+        result = evaluate(load_policy(path), kind.__name__, "reach", 5)
+        assert result.episodes == 5
+
+
+def test_a_policy_of_a_run_of_another_format_is_refused(touch_run, tmp_path):
+    model = PPO.load(touch_run / "last.zip", device="cpu")
+    assert model.card["run_format"] == RUN_FORMAT
+    del model.card["run_format"]
+    model.save(tmp_path / "last.zip")
+    for path in (tmp_path, tmp_path / "last.zip"):
+        with pytest.raises(ValueError, match=r"last\.zip: .*another version"):
+            load_policy(path)
+
+
+def onnx_policy(path, size, outputs):
+    weight = np.full((size, outputs), 0.01, np.float32)
+    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
+    graph = helper.make_graph(
+        [helper.make_node("MatMul", ["observation", "weight"], ["action"])],
+        "policy",
+        [helper.make_tensor_value_info("observation", kind, ["batch", size])],
+        [helper.make_tensor_value_info("action", kind, ["batch", outputs])],
+        [onnx.numpy_helper.from_array(weight, "weight")],
+    )
+    opset = [helper.make_opsetid("", 17)]
+    onnx.save(helper.make_model(graph, opset_imports=opset, ir_version=9), path)
+
+
+def test_an_onnx_policy_whose_spaces_fit_drives(tmp_path):
+    onnx_policy(tmp_path / "good.onnx", 8, 2)
+    driver = load_policy(tmp_path / "good.onnx")
+    assert evaluate(driver, "onnx", "reach", 5).episodes == 5
+    with pytest.raises(ValueError, match="expects observations"):
+        evaluate(driver, "onnx", "touch", 2)
+    onnx_policy(tmp_path / "wrong.onnx", 8, 3)
+    with pytest.raises(ValueError, match="expected actions"):
+        evaluate(load_policy(tmp_path / "wrong.onnx"), "onnx", "reach", 2)
+
+
+def test_a_policy_can_sit_in_any_seat_by_its_path(touch_run):
+    world = ah.make_world("touch", 2, drivers={"paddle_0": str(touch_run)})
+    world.reset(0)
+    world.step(np.zeros((2, 0, 2)))
+    assert np.abs(world.command).max() > 0
+
+
+def test_an_exported_policy_is_one_small_file(tmp_path):
+    config = preset("reach", SMALL)
+    env = ah.make_sb3_vec("reach", 32, backend="numba")
+    from marl_airhockey.learn.network import to_numpy
+    from marl_airhockey.learn.sb3_callback import AdaptiveRate
+
+    model = build_model(config, env, AdaptiveRate(config, 1e-3))
+    to_numpy(model, {"scenario": "reach"}).save(tmp_path / "policy.npz")
+    assert (tmp_path / "policy.npz").stat().st_size < 300_000
+    driver = make_agent(tmp_path / "policy.npz")
+    seen = env.reset()
+    mean = model.predict(seen, deterministic=True)[0]
+    np.testing.assert_allclose(
+        np.clip(driver.predict(seen, True), -1, 1), mean, atol=1e-5
+    )
+    (tmp_path / "bad.npz").write_bytes(b"nothing")
+    with pytest.raises(ValueError, match="no policy of ours"):
+        NumpyPolicy.load(tmp_path / "bad.npz")
