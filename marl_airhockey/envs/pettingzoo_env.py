@@ -141,7 +141,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
                 `set_state`; the memory may be left out.
 
         Raises:
-            ValueError: an unknown option, or a state that does not fit, named.
+            ValueError: a misspelt option, or a state that does not fit, named.
         """
         if seed is not None:
             self.np_random = np.random.default_rng(seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Any
 
 from marl_airhockey.core.errors import unknown_name
@@ -16,17 +17,19 @@ def reset_world(
 ) -> Observation:
     """Reset worlds, to given states if the options hold them.
 
+    Other options pass unheeded, as conformance tests send some, but for misspelt ones.
+
     Args:
         world: the worlds.
         seed: see `World.reset`.
         options: ``state`` and ``memory`` of `World.set_state`, both optional.
 
     Raises:
-        ValueError: an unknown option, or a state that does not fit, named.
+        ValueError: a misspelt option, or a state that does not fit, named.
     """
     given = options or {}
     for name in given:
-        if name not in OPTIONS:
+        if name not in OPTIONS and get_close_matches(name, OPTIONS):
             raise ValueError(unknown_name("reset option", name, OPTIONS))
     if "memory" in given and "state" not in given:
         raise ValueError("reset options: a memory needs its state")

@@ -344,4 +344,4 @@ def test_what_an_arm_cannot_do_is_refused():
     far = Scene(
         TABLE, (HOME,), pucks=1, goal_lines=(GoalLine("goal", 2, 0.3),), blocks=1
     )
-    assert "goal line" in find_backend("robosuite").supports(far)
+    assert "slide into a goal" in find_backend("robosuite").supports(far)

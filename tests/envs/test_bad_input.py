@@ -141,7 +141,7 @@ def test_a_scene_that_a_backend_cannot_play_is_refused_with_the_reason(backend):
         def scene(self):
             return replace(super().scene, blocks=2)
 
-    with pytest.raises(ValueError, match="slide into a goal line"):
+    with pytest.raises(ValueError, match="slide into a goal;"):
         ah.parallel_env(BlocksAndMouths(), backend=backend)
 
 

@@ -48,12 +48,8 @@ def play(world, given):
     return seen
 
 
-@pytest.mark.parametrize("steps", MOMENTS)
-@pytest.mark.parametrize(("game", "keywords"), GAMES)
-def test_copies_of_worlds_go_on_to_the_same_bit(
-    game, keywords, backend, steps, tmp_path
-):
-    world = ah.make_world(game, 2, backend=backend, **keywords)
+def check_twins(world, steps, folder):
+    """Copies made after some steps go on to the same bit, and by themselves."""
     world.reset(3)
     play(world, actions(world, steps, 1))
     given = actions(world, 30, 2)
@@ -63,7 +59,7 @@ def test_copies_of_worlds_go_on_to_the_same_bit(
         cloudpickle.loads(cloudpickle.dumps(world)),
     ]
     sleeper = copy.deepcopy(world)
-    with open(tmp_path / "world", "wb") as file:
+    with open(folder / "world", "wb") as file:
         pickle.dump((world, given), file)
     # The copy first: what it does must not move the original, nor the other way round.
     first = play(twins[0], given)
@@ -72,11 +68,36 @@ def test_copies_of_worlds_go_on_to_the_same_bit(
         np.testing.assert_equal(play(twin, given), first)
     del world, twins
     np.testing.assert_equal(play(sleeper, given), first)
+    return first
+
+
+def check_another_process(first, folder):
+    """The world that was pickled goes on in another process to the same bit."""
+    files = str(folder / "world"), str(folder / "seen")
+    subprocess.run([sys.executable, "-c", GO_ON, *files], check=True)
+    with open(files[1], "rb") as file:
+        np.testing.assert_equal(pickle.load(file), first)
+
+
+@pytest.mark.parametrize("steps", MOMENTS)
+@pytest.mark.parametrize(("game", "keywords"), GAMES)
+def test_copies_of_worlds_go_on_to_the_same_bit(
+    game, keywords, backend, steps, tmp_path
+):
+    world = ah.make_world(game, 2, backend=backend, **keywords)
+    first = check_twins(world, steps, tmp_path)
     if steps == MOMENTS[-1] and not keywords:
-        files = str(tmp_path / "world"), str(tmp_path / "seen")
-        subprocess.run([sys.executable, "-c", GO_ON, *files], check=True)
-        with open(files[1], "rb") as file:
-            np.testing.assert_equal(pickle.load(file), first)
+        check_another_process(first, tmp_path)
+
+
+@pytest.mark.parametrize("steps", MOMENTS)
+def test_copies_of_arms_go_on_to_the_same_bit(steps, tmp_path):
+    pytest.importorskip("robosuite")
+    physics = {"arm_stiffness": (800.0, 1200.0), "arm_payload": 0.1}
+    world = ah.make_world("juggle", 2, backend="robosuite", physics=physics)
+    first = check_twins(world, steps, tmp_path)
+    if steps == MOMENTS[-1]:
+        check_another_process(first, tmp_path)
 
 
 def test_a_copy_before_the_first_reset_is_a_twin_too():

@@ -71,7 +71,7 @@ class RobosuiteBackend(Backend):
             if seat.reach != held.reach or seat.speed > held.speed:
                 return f"an arm cannot hold the seat of paddle_{i}: say seats='robot'"
         if scene.blocks and any(goal_line.width for goal_line in scene.goal_lines):
-            return "blocks could slide into a goal line; leave out one or the other"
+            return "blocks could slide into a goal; leave out one or the other"
         return None
 
     def __init__(
