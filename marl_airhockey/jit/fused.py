@@ -45,6 +45,11 @@ class Fused:
         self.refused: str | None = None
         """Reason why it runs in numpy; None if it is compiled or was not called yet."""
 
+    @property
+    def prepared(self) -> bool:
+        """True if it is compiled, or known to be impossible to compile."""
+        return self._loop is not None or self.refused is not None
+
     def prepare(self, *sources: Source) -> tuple[Sink, ...]:
         """Compile for arrays like these; return their sinks, freshly allocated."""
         plain = self._function(*sources)

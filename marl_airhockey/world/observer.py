@@ -68,6 +68,13 @@ class Observer:
         """Layout of the open seats' observations."""
         return self._layouts[self.observe]
 
+    def compile(self, sensed: State, memory: Memory) -> None:
+        """Compile all forms of observations, unless they are, for arrays like these."""
+        history = {"history": self.sensor.history}
+        for show in self._shows.values():
+            if not show.prepared:
+                show.prepare(vars(sensed), memory, history)
+
     def read(
         self,
         sensed: State,

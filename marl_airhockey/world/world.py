@@ -77,7 +77,6 @@ class World:
         self._sensed = self._state
         self._step: ControlStep | None = None
 
-    # The arrays of a step are overwritten by the step after the next, so these copy.
     @property
     def state(self) -> State:
         """True state, table frame; freshly allocated."""
@@ -202,6 +201,7 @@ class World:
         self._step.now.begin(worlds)
         self._actions.reset(worlds)
         self._sense(worlds)
+        self.observer.compile(self._sensed, self._memory)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put rows of a state and a memory into some worlds, by index."""
