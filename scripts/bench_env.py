@@ -3,7 +3,7 @@
     python scripts/bench_env.py --rounds 5 --seconds 2 \
         --vmas X/bin/python --jaxmarl Y/bin/python
 
-One world at a time: our dict environment, a bare loop of Chipmunk's own step over the
+One world at a time: our dict environment, a bare loop of pymunk's own step over the
 very same world (paddle velocities set, pucks put back as often as episodes restart),
 PettingZoo's multiwalker (pip install box2d) and mpe2's simple_tag. Many at a time: our
 arrays, and VMAS and JaxMARL, each in an interpreter of its own that works only in its
@@ -96,7 +96,7 @@ def ours(scenario: str, backend: str) -> Made:
 
 def bare(scenario: str) -> Made:
     """Chipmunk's step alone over the world of our environment."""
-    env = ah.parallel_env(scenario)
+    env = ah.parallel_env(scenario, backend="pymunk")
     env.reset(seed=0)
     backend = env.world.backend
     assert isinstance(backend, PymunkBackend)
@@ -324,12 +324,12 @@ def rows(
         number: worlds of VMAS and JaxMARL.
     """
     out = []
-    many = f"ours, {WORLDS} worlds, batched"
+    many = f"ours, {WORLDS} worlds, numba"
     few = f"ours, {PYMUNK_WORLDS} worlds, pymunk"
     here: list[tuple[str, str, Callable[[], Made]]] = [
+        ("ours, dict env, numba", "env-steps", lambda: ours(scenario, "numba")),
         ("ours, dict env, pymunk", "env-steps", lambda: ours(scenario, "pymunk")),
-        ("ours, dict env, batched", "env-steps", lambda: ours(scenario, "numba")),
-        ("bare cpSpaceStep", "env-steps", lambda: bare(scenario)),
+        ("bare pymunk steps", "env-steps", lambda: bare(scenario)),
         ("multiwalker", "env-steps", multiwalker),
         ("mpe2 simple_tag", "env-steps", simple_tag),
         (many, "agent-steps", lambda: worlds(scenario, "numba", WORLDS)),
