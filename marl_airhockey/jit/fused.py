@@ -173,7 +173,7 @@ class _Loop:
         """Return a stage that fills ``sinks`` from ``sources``; see `Fused.stage`."""
         given = [sources[i][key] for i, key in self._inputs]
         outputs = [array for sink in sinks for array in sink.values()]
-        return Stage(self._load().kernel, (*given, *outputs))
+        return Stage(self._load().kernel, (*given, *outputs), generated=True)
 
     def _copying(self, *arrays: Array) -> None:
         """Call the loop on copies of arrays that are not contiguous or of another type.

@@ -38,6 +38,8 @@ class Stage(NamedTuple):
     """Arrays (B, *), `Fixed` arrays and numbers; any values for a Python function"""
     stops: bool = False
     """True if the function returns False to end the pipeline"""
+    generated: bool = False
+    """True for a loop that was generated for one scenario"""
 
     def __call__(self) -> bool:
         """Call the function; return False if the pipeline must end."""
@@ -73,7 +75,8 @@ class Pipeline:
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
         self._parts: list[Stage | _Compiled] = []
-        for compiled, group in groupby(stages, lambda stage: stage.compiled):
+        # Apart from a scenario's own loop, as scenes alike then share what is compiled.
+        for (compiled, _), group in groupby(stages, _kind):
             part = list(group)
             if compiled:
                 self._parts.append(_Compiled(rows, part, name))
@@ -87,6 +90,10 @@ class Pipeline:
             if not part():
                 return False
         return True
+
+
+def _kind(stage: Stage) -> tuple[bool, bool]:
+    return stage.compiled, stage.generated
 
 
 class _Compiled:
