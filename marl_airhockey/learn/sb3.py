@@ -23,9 +23,17 @@ from marl_airhockey.learn.self_play import make_training_env
 
 def train_with_sb3(run: TrainingRun) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
-    config, folder, progress = run.config, run.folder, run.progress
-    torch.set_num_threads(config.torch_threads)
+    torch.set_num_threads(run.config.torch_threads)
+    # Of the whole process, so it must not stay: others count on subnormal numbers.
     torch.set_flush_denormal(True)
+    try:
+        return _train(run)
+    finally:
+        torch.set_flush_denormal(False)
+
+
+def _train(run: TrainingRun) -> Metrics:
+    config, folder, progress = run.config, run.folder, run.progress
     rate = AdaptiveRate(config, progress.rate or config.learning_rate)
     env = make_training_env(config, config.num_worlds, folder / "pool")
     if progress.steps:
