@@ -148,7 +148,7 @@ class Observer:
         sensed: State,
         memory: Memory,
         seats: Array,
-        served: Rows | None,
+        served: Array | None,
     ) -> Observation:
         """Return the observations of some seats after a step, freshly allocated.
 
@@ -165,7 +165,7 @@ class Observer:
         observation = self.take(own, seats)
         if served is None:
             return observation
-        return self.renewed(observation, sensed, memory, seats, np.asarray(served))
+        return self.renewed(observation, sensed, memory, seats, served)
 
     def renewed(
         self,
