@@ -214,9 +214,9 @@ def test_rewards_are_the_sum_of_their_terms(scenario, backend):
 
 
 @pytest.mark.parametrize("driver", list(FLOORS))
-def test_luck_does_not_succeed(single, backend, driver):
-    keywords = {"backend": backend}
-    result = evaluate(ah.make_agent(driver), driver, single, 400, 0, keywords)
+def test_luck_does_not_succeed(single, driver):
+    # A matter of the rules, not of the backend: backends agree, as other tests show.
+    result = evaluate(ah.make_agent(driver), driver, single, 400, 0, {})
     if single == "touch":
         # A falling puck meets a still paddle one time in four.
         assert 0.15 < result.success < 0.40
