@@ -100,7 +100,8 @@ class FreeForAll(Scenario):
         held = rewards.held(self.scene, t)
         lying = rewards.lying(t, held)
         foul = (held[..., 0] >= self.possession - 1e-9) & (lives > 0.0)
-        dead = (lying[..., 0] >= 1.0 - 1e-9) & ~lost.any(-1)
+        gone = (lying[..., 0] >= 1.0 - 1e-9) | t.after.lifted[..., 0]
+        dead = gone & ~lost.any(-1)
         serve = np.full_like(t.memory["served"], -1.0)
         for side in range(self.sides):
             follower = self._follower(lives, side)

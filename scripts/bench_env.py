@@ -112,7 +112,7 @@ def bare(scenario: str) -> Made:
         for vx, vy in drawn:
             count += 1
             if count % 40 == 0:
-                space.reset(position, velocity, state.angle[0], touching)
+                space.reset(position, velocity, state.angle[0], state.spin[0], touching)
             paddle.velocity = (vx, vy) if count & 1 else (-vx, -vy)
             for _ in range(substeps):
                 chipmunk.step(dt)

@@ -72,7 +72,7 @@ def physics(
     seats = (make_seat("arcade", table, side=0),) * paddles
     scene = Scene(table, seats, pucks=pucks, blocks=blocks, block_radius=0.0277)
     kind = find_backend("numba")
-    backend = kind(scene, BATCH, 0.05, kind.default_substeps)
+    backend = kind(scene, BATCH, 0.05)
     everywhere = np.arange(BATCH)
     values = {name: np.full(BATCH, p.default) for name, p in PARAMETERS.items()}
     backend.set_physics({**values, "tilt": np.zeros(BATCH)}, everywhere)

@@ -14,8 +14,15 @@ from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
-MAX_PRESCRIBED_SPEED = 5.0
-"""m/s: a prescribed paddle that must be faster than this is lifted, without contact."""
+MAX_PRESCRIBED_SPEED = 12.0
+"""m/s: a prescribed paddle that must be faster than this is raised, without contact."""
+
+
+PATIENCE = 0.1
+"""s: a puck that a prescribed paddle leaves no room for so long is lifted."""
+MOMENTS = 10
+"""Number of equal parts of a control step between which a path has rows, for backends
+without physics steps of their own."""
 
 
 class Command(NamedTuple):
@@ -28,6 +35,8 @@ class Command(NamedTuple):
     that are moved from outside; nan for all others"""
     closed: Array
     """(B, goal_lines) bool: wall in this step"""
+    raised: Array
+    """(B, seats) bool: held above the table, so that it touches nothing"""
 
     @staticmethod
     def still(scene: Scene, worlds: int) -> Command:
@@ -37,20 +46,26 @@ class Command(NamedTuple):
             np.zeros((worlds, seats, 2)),
             np.full((worlds, seats, 4), np.nan),
             np.zeros((worlds, len(scene.goal_lines)), np.bool_),
+            np.zeros((worlds, seats), np.bool_),
         )
 
 
 class Backend(ABC):
     """Physics of B worlds with one scene.
 
-    Paddles track their command and are not pushed back by a puck. A backend can be
+    Paddles track their command and are not pushed back by a puck, but one that is not
+    prescribed stops at a puck that cannot give way. A prescribed one that leaves a puck
+    no room for 0.1 s lifts it off the table. A backend can be
     copied and pickled at any moment; the copy goes on by itself.
 
     Args:
         scene: who is on the table.
         num_worlds: B.
         control_dt: s of a step.
-        substeps: physics steps in it.
+        substeps: least number of physics steps in it; None for the backend's own.
+
+    Raises:
+        ValueError: substeps for a backend that finds contacts at their moments.
     """
 
     exact: ClassVar[bool]
@@ -59,19 +74,39 @@ class Backend(ABC):
     """True if paddles move exactly as commanded and contacts take no time."""
     realtime: ClassVar[bool] = False
     """True if a step takes as long as it lasts."""
-    default_substeps: ClassVar[int]
+    timestep: ClassVar[float | None]
+    """Longest physics step unless ``substeps`` is given, s; None without such steps."""
     cameras: ClassVar[tuple[str, ...]] = ()
     """Names of views that it can take pictures from."""
 
     def __init__(
-        self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
+        self,
+        scene: Scene,
+        num_worlds: int,
+        control_dt: float,
+        substeps: int | None = None,
     ) -> None:
         self.scene, self.num_worlds = scene, num_worlds
-        self.control_dt, self.substeps = control_dt, substeps
+        self.control_dt = control_dt
+        self.substeps = self._count(control_dt, substeps)
+        """Least number of physics steps in a control step; 0 without such steps."""
+        self.moments = self.substeps or MOMENTS
+        """Number of equal parts of a control step between which a path has rows."""
         self._rest = scene.still_state(num_worlds)
         """State that `step` begins with before a `reset`, and whose `visible` all
         states share, read-only."""
         self._before = self._rest
+
+    @classmethod
+    def _count(cls, control_dt: float, substeps: int | None) -> int:
+        if cls.timestep is not None:
+            return substeps or int(np.ceil(control_dt / cls.timestep - 1e-9))
+        if substeps is not None:
+            raise ValueError(
+                "substeps: this backend finds every contact at its moment and has no "
+                "physics steps; leave it out"
+            )
+        return 0
 
     @classmethod
     def available(cls) -> str | None:
@@ -118,8 +153,8 @@ class Backend(ABC):
         fields = {n: np.zeros_like(getattr(self._rest, n)) for n in RESULTS}
         path = None
         if self.scene.path:
-            moments, movers = self.substeps + 1, self.scene.bodies.movers
-            path = np.zeros((self.num_worlds, moments, movers, 4))
+            rows, movers = self.moments + 1, self.scene.bodies.movers
+            path = np.zeros((self.num_worlds, rows, movers, 4))
         bodies, visible = self.scene.bodies, self._rest.visible
         return State(bodies=bodies, visible=visible, path=path, **fields)
 

@@ -191,10 +191,15 @@ class Scenario(ABC):
         return terms
 
     def is_terminated(self, t: Transition) -> Array:
-        """(...) bool: `terminated`; with goals="dict" only a met goal ends it."""
-        if self.goals == "dict":
-            return self.goal_met(t.after, t.new_memory)
-        return self.terminated(t)
+        """(...) bool: `terminated`; with goals="dict" only a met goal ends it.
+
+        Where nobody serves, a puck that was lifted off the table ends it, too.
+        """
+        met = self.goals == "dict"
+        ends = self.goal_met(t.after, t.new_memory) if met else self.terminated(t)
+        if self.needs_serve(t) is None:
+            ends = ends | t.after.lifted.any(-1)
+        return ends
 
     def is_success(self, t: Transition) -> Array:
         """(...) or (..., seats) bool: `success`; with goals="dict" the goal is met."""

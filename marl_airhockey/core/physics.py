@@ -20,6 +20,10 @@ from marl_airhockey.types import Array
 Value = float | tuple[float, float]
 """Fixed value of a parameter, or its range ``(low, high)``."""
 
+Given = str | Path | Mapping[str, Any]
+"""Physics as users give it: the name of a preset, a TOML file, or values and ranges by
+name, which change those of a ``preset`` if one is named among them."""
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -35,11 +39,20 @@ class Parameter:
 
 
 PARAMETERS: dict[str, Parameter] = {
-    "tilt": Parameter(5.5, 0.0, 45.0, "deg", "slope toward home"),
-    "wall_restitution": Parameter(0.9, 0.0, 1.0, "1", "puck against wall"),
-    "paddle_restitution": Parameter(0.85, 0.0, 1.0, "1", "puck against paddle"),
-    "block_restitution": Parameter(0.9, 0.0, 1.0, "1", "puck against block"),
-    "puck_damping": Parameter(0.15, 0.0, 10.0, "1/s", "drag of what slides"),
+    "tilt": Parameter(5.5, -45.0, 45.0, "deg", "slope toward home"),
+    "cross_tilt": Parameter(0.0, -45.0, 45.0, "deg", "slope toward the right"),
+    "puck_drag": Parameter(0.0, 0.0, 1.0, "1/m", "quadratic drag of a puck"),
+    "puck_damping": Parameter(0.15, 0.0, 10.0, "1/s", "linear drag of a puck"),
+    "wall_restitution": Parameter(0.9, 0.0, 1.0, "1", "at walls, at 1 m/s"),
+    "wall_restitution_slope": Parameter(
+        0.0, -0.2, 0.2, "1", "its loss per ln(m/s) of normal speed"
+    ),
+    "wall_friction": Parameter(0.0, 0.0, 2.0, "1", "Coulomb, puck at walls"),
+    "paddle_restitution": Parameter(0.85, 0.0, 1.0, "1", "puck at a paddle"),
+    "paddle_friction": Parameter(0.0, 0.0, 2.0, "1", "Coulomb, puck at a paddle"),
+    "puck_restitution": Parameter(1.0, 0.0, 1.0, "1", "puck at a puck"),
+    "puck_friction": Parameter(0.0, 0.0, 2.0, "1", "Coulomb, puck at puck or block"),
+    "block_restitution": Parameter(0.9, 0.0, 1.0, "1", "of blocks"),
     "puck_mass": Parameter(0.03, 0.001, 1.0, "kg", "mass of a puck"),
     "block_mass": Parameter(0.06, 0.001, 5.0, "kg", "mass of a block"),
     "block_friction": Parameter(2.4, 0.0, 20.0, "m/s2", "Coulomb friction of blocks"),
@@ -53,8 +66,54 @@ PARAMETERS: dict[str, Parameter] = {
     "arm_force": Parameter(40.0, 5.0, 80.0, "N", "of a paddle on the table", arms=True),
     "arm_payload": Parameter(0.0, 0.0, 1.0, "kg", "unknown to the arm", arms=True),
 }
-"""Physical parameters by name. A pair's restitution is the lower of its bodies'; that
-of a puck is 1."""
+"""Physical parameters by name."""
+
+
+PRESETS: dict[str, dict[str, float]] = {
+    "professional": {
+        "puck_drag": 0.02,
+        "puck_damping": 0.0,
+        "wall_restitution": 0.85,
+        "wall_restitution_slope": 0.02,
+        "wall_friction": 0.12,
+        "paddle_restitution": 0.5,
+        "paddle_friction": 0.1,
+        "puck_restitution": 0.9,
+        "puck_friction": 0.1,
+        "block_restitution": 0.7,
+    },
+    "wooden": {
+        "puck_drag": 0.027,
+        "puck_damping": 0.0,
+        "wall_restitution": 0.67,
+        "wall_restitution_slope": 0.07,
+        "wall_friction": 0.29,
+        "paddle_restitution": 0.62,
+        "paddle_friction": 0.1,
+        "puck_restitution": 0.9,
+        "puck_friction": 0.1,
+        "block_restitution": 0.7,
+    },
+    "authors": {"tilt": 4.016, "puck_drag": 0.0, "puck_damping": 0.346},
+    "frictionless": {
+        "puck_drag": 0.0,
+        "puck_damping": 0.0,
+        "wall_restitution": 0.9,
+        "wall_restitution_slope": 0.0,
+        "wall_friction": 0.0,
+        "paddle_restitution": 0.85,
+        "paddle_friction": 0.0,
+        "puck_restitution": 1.0,
+        "puck_friction": 0.0,
+        "block_restitution": 0.9,
+    },
+}
+"""Presets by name. ``professional`` and ``wooden`` are round numbers of two real tables
+measured in play; friction at paddles, between pucks and the restitutions of pucks and
+blocks could not be measured there and are guesses. ``authors`` is what the paper's
+authors identified on their table, a pull of 0.687 m/s2 and a linear drag.
+``frictionless`` has closed forms: no drag, no friction, restitutions that do not depend
+on speed."""
 
 
 ROBOT_SENSING: dict[str, float] = {
@@ -74,8 +133,13 @@ PROFILES: tuple[str, ...] = ("ideal", "robot")
 """Names of the profiles."""
 
 
-PUCK_SPEED_CAP = 5.0
-"""Highest speed of a puck (m/s), which bounds what a squeezed one can gain."""
+PUCK_SPEED_CAP = 12.0
+"""Highest speed of a puck (m/s); fewer than one in 200 shots of people are faster."""
+
+
+SLOWEST_BOUNCE = 0.4
+"""Normal speed (m/s) below which restitution at walls is that of this speed: slower
+bounces were not measured, and the law would pass 1 there."""
 
 
 class Physics:
@@ -84,7 +148,8 @@ class Physics:
     Args:
         base: values that replace the defaults (table, seats, scenario).
         profile: "ideal", or "robot" for delays, noise and a spread of +-15 %.
-        given: the user's values and ranges; they override ``base`` and profile.
+        given: the user's physics. A preset overrides ``base``; values and ranges
+            override the profile, too.
         arms: True if the backend has robot arms, whose parameters exist then.
 
     Raises:
@@ -95,11 +160,14 @@ class Physics:
         self,
         base: Mapping[str, float],
         profile: str = "ideal",
-        given: Mapping[str, Value] | None = None,
+        given: Given | None = None,
         arms: bool = False,
     ) -> None:
         if profile not in PROFILES:
             raise ValueError(unknown_name("profile", profile, PROFILES))
+        chosen = load_physics(given) if isinstance(given, (str, Path)) else given or {}
+        values = dict(chosen)
+        base = {**base, **_preset(values.pop("preset", None))}
         self.ranges: dict[str, tuple[float, float]] = {}
         for name, parameter in PARAMETERS.items():
             if parameter.arms and not arms:
@@ -108,11 +176,11 @@ class Physics:
             spread = 0.0
             if profile == "robot":
                 value = ROBOT_SENSING.get(name, value)
-                spread = ROBOT_SPREAD * value
+                spread = ROBOT_SPREAD * abs(value)
             high = min(value + spread, parameter.high)
             self.ranges[name] = (value - spread, high)
-        for name, chosen in (given or {}).items():
-            pair = _checked(name, chosen)
+        for name, value in values.items():
+            pair = _checked(name, value)
             if name not in self.ranges:
                 raise ValueError(
                     f"physics[{name!r}] is of arms, and this backend has none: "
@@ -159,13 +227,29 @@ def _checked(name: str, value: Value) -> tuple[float, float]:
     return low, high
 
 
-def load_physics(path: Path) -> dict[str, Any]:
-    """Read a preset for ``physics=``: parameters by name, numbers or pairs, in TOML.
+def _preset(name: object) -> dict[str, float]:
+    if name is None:
+        return {}
+    if name not in PRESETS:
+        raise ValueError(unknown_name("physics preset", str(name), PRESETS))
+    return PRESETS[str(name)]
+
+
+def load_physics(source: str | Path) -> dict[str, Any]:
+    """Return physics by the name of a preset, or from a TOML file of parameters.
+
+    In a file a parameter is a number or a pair; ``preset`` may name what they change.
 
     Raises:
-        ValueError: no such file.
+        ValueError: neither a preset nor a file that can be read.
     """
+    if str(source) in PRESETS:
+        return {"preset": str(source)}
     try:
-        return tomllib.loads(path.read_text())
+        return tomllib.loads(Path(source).read_text())
     except (OSError, tomllib.TOMLDecodeError) as error:
-        raise ValueError(f"{path}: no preset of physics: {error}") from error
+        names = ", ".join(PRESETS)
+        raise ValueError(
+            f"physics {str(source)!r}: no preset ({names}) and no TOML file of "
+            f"parameters: {error}"
+        ) from error

@@ -124,6 +124,7 @@ class Scene:
             banked=np.zeros((*pucks, sides), np.int16),
             crossed=np.zeros((*pucks, lines), np.bool_),
             crossed_velocity=np.zeros((*pucks, lines, 2)),
+            lifted=np.zeros(pucks, np.bool_),
             visible=np.ones(pucks, np.bool_),
             time=np.zeros(worlds),
         )

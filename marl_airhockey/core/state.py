@@ -98,6 +98,9 @@ class State:
     (..., pucks, goal_lines)"""
     crossed_velocity: Array
     """Velocity of the puck as it crossed (..., pucks, goal_lines, 2), m/s"""
+    lifted: Array
+    """True if the puck was taken off the table, as a prescribed paddle left it no room
+    (..., pucks)"""
     visible: Array
     """True if the sensor detects the puck (..., pucks)"""
     time: Array
@@ -159,7 +162,7 @@ ARRAYS = tuple(f.name for f in fields(State) if f.name not in ("bodies", "path")
 """Names of the fields that every state has."""
 EVENTS = (
     *("touched", "touched_at", "touching", "banked"),
-    *("crossed", "crossed_velocity"),
+    *("crossed", "crossed_velocity", "lifted"),
 )
 """Names of the fields that hold the events of a step."""
 RESULTS = ("position", "velocity", "angle", "spin", "time", *EVENTS)

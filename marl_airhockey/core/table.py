@@ -7,12 +7,13 @@ frame rotated so that the side's inward normal is +x.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from marl_airhockey.core.geometry import _cross
+from marl_airhockey.core.physics import PRESETS
 from marl_airhockey.types import Array
 
 GRAVITY = 9.81
@@ -103,12 +104,15 @@ class Table:
 TABLES: dict[str, Table] = {
     "standard": Table.rectangle(1.6764, 0.6096),
     "full_size": Table.rectangle(1.9304, 0.8636),
-    "ut_sysid": Table.rectangle(
-        1.9304,
-        0.8636,
-        tilt=float(np.degrees(np.arcsin(0.687 / GRAVITY))),
-        puck_damping=0.346,
+    "ubc_pro": replace(
+        Table.rectangle(2.362, 1.144), puck_radius=0.0413, paddle_radius=0.0505
+    ),
+    "ubc_wood": replace(
+        Table.rectangle(1.9885, 0.9905, **PRESETS["wooden"]),
+        puck_radius=0.03145,
+        paddle_radius=0.0501,
     ),
 }
-"""Table presets: the 66 x 24 in workspace, the 76 x 34 in table, and that table with
-the tilt and damping that the paper's authors identified."""
+"""Table presets: the 66 x 24 in workspace and the 76 x 34 in table of the paper, and
+the professional and the home-made wooden table whose play was measured, the last with
+its physics."""

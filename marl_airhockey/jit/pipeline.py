@@ -14,7 +14,7 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
+from numba import carray, njit, types  # type: ignore[attr-defined]
 from numba.core import cgutils
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
@@ -62,6 +62,12 @@ def pointer(_: Any, address: Any) -> Any:
         return builder.inttoptr(args[0], cgutils.voidptr_t)
 
     return types.voidptr(types.intp), generate
+
+
+@njit(inline="always")
+def view(address: int, shape: Any, dtype: Any) -> Array:
+    """Return the array at an address, without an owner; for compiled code alone."""
+    return carray(pointer(address), shape, dtype)  # type: ignore[call-arg]
 
 
 class Pipeline:

@@ -10,7 +10,6 @@ from marl_airhockey.core.seat import Seat
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, world_state
-from marl_airhockey.registry import find_backend
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.step_result import StepResult
 
@@ -45,9 +44,7 @@ class LiveMatch:
         handicap: Handicap | None = None,
         seed: int | None = None,
     ) -> None:
-        backend = find_backend(keywords.get("backend", "pymunk"))
-        substeps = 4 if backend.ideal else 16
-        usual: Keywords = {"control_dt": 1 / RATE, "substeps": substeps}
+        usual: Keywords = {"control_dt": 1 / RATE}
         self.keywords: Keywords = {**usual, **keywords}
         self.world = build_world(scenario, 1, autoreset=False, keywords=self.keywords)
         agents = [f"paddle_{i}" for i in range(len(self.seats))]

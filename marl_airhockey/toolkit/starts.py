@@ -73,7 +73,8 @@ def serve(
     """Place a puck at the centre, moving at 0.5 m/s within 0.3 rad of a heading.
 
     The state is changed in place, but for its paddles. Several pucks are placed beside
-    each other.
+    each other. Where a paddle or another puck is in the way, the puck is placed at the
+    nearest free point of the middle line.
 
     Args:
         rng: one stream per row.
@@ -83,11 +84,29 @@ def serve(
         rows: (W,) bool: True for the rows to serve; None for all.
     """
     angle = heading + rng.uniform(-0.3, 0.3)
-    place = np.array([0.0, 0.12 * (puck - 0.5 * (state.bodies.pucks - 1))])
+    place = _free_place(state, puck)
     motion = 0.5 * np.stack([np.cos(angle), np.sin(angle)], -1)
     some = slice(None) if rows is None else rows
-    state.puck[some, puck], state.puck_velocity[some, puck] = place, motion[some]
+    state.puck[some, puck], state.puck_velocity[some, puck] = place[some], motion[some]
+    state.spin[some, state.bodies.puck.start + puck] = 0.0
     state.touching[some, :, puck] = False
+
+
+SIDESTEPS = 0.02 * np.array([0, *(s * k for k in range(1, 13) for s in (1, -1))])
+"""Distances along the middle line, from where a puck should be served, m."""
+
+
+def _free_place(state: State, puck: int) -> Array:
+    """(W, 2) points of the middle line that no paddle or other puck covers, m."""
+    bodies = state.bodies
+    first = 0.12 * (puck - 0.5 * (bodies.pucks - 1))
+    places = np.stack([np.zeros_like(SIDESTEPS), first + SIDESTEPS], -1)
+    others = [i for i in range(bodies.puck.stop) if i != bodies.puck.start + puck]
+    radius = np.array(bodies.radius)
+    touch = radius[others] + radius[bodies.puck.start] + 0.005
+    gap = state.position[:, None, others] - places[:, None]
+    free = (np.hypot(gap[..., 0], gap[..., 1]) > touch).all(-1)
+    return np.asarray(places[free.argmax(-1)])
 
 
 def puck_gap(state: State) -> Array:

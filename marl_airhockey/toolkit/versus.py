@@ -89,7 +89,9 @@ class Versus(Scenario):
         foul = held >= self.possession - 1e-9
         lying = rewards.lying(t, held)
         toward = 1.0 * (far | foul[..., 0, :]) - 1.0 * (home | foul[..., -1, :])
-        again = (toward == 0.0) & (lying >= 1.0 - 1e-9)
+        again = (toward == 0.0) & ((lying >= 1.0 - 1e-9) | t.after.lifted)
+        # Between two paddles on the middle line both clocks run at once.
+        again |= foul.all(-2)
         nearer = np.where(t.after.puck[..., 0] < 0.0, -1.0, 1.0)
         serve = np.where(again, nearer, toward)
         return {

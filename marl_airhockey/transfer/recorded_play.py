@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.physics import PUCK_SPEED_CAP
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.evaluation.evaluate import build_driven_world
 from marl_airhockey.evaluation.recordings import read
@@ -20,8 +19,9 @@ from marl_airhockey.registry import make_scenario
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 
-JUMP_SPEED = 1.5 * PUCK_SPEED_CAP
-"""Speed, m/s, above which a body has not moved by physics: served or put by hand."""
+JUMP_SLACK = 0.5
+"""Excess of a body's mean speed in a step over its speeds before and after it, m/s,
+above which it has not moved by physics: it was served or put by hand."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,10 @@ class RecordedPlay:
         A row in which a body has jumped, say a served puck, follows no other.
         """
         moved = np.diff(self.position, axis=0, prepend=self.position[:1])
-        distance = np.hypot(moved[..., 0], moved[..., 1]).max(-1)
-        jumped = distance > JUMP_SPEED * self.control_dt
+        distance = np.hypot(moved[..., 0], moved[..., 1])
+        speed = np.hypot(self.velocity[..., 0], self.velocity[..., 1])
+        most = np.maximum(speed, np.roll(speed, 1, axis=0)) + JUMP_SLACK
+        jumped = (distance > most * self.control_dt).any(-1)
         length, starts = 0, []
         for row, follows in enumerate(self.follows & ~jumped):
             length = length + 1 if follows else 0

@@ -140,9 +140,7 @@ class _SegmentModel:
                 f"at least {MIN_SEGMENTS} are needed: play longer (--steps)"
             )
         kind = find_backend("numba")
-        self._backend = kind(
-            play.scene, len(self.rows), play.control_dt, kind.default_substeps
-        )
+        self._backend = kind(play.scene, len(self.rows), play.control_dt)
 
     def errors(self, usual: dict[str, float], values: Array) -> tuple[Array, Array]:
         """Return (W, pucks) and (W, seats) distances from the recorded end, m.

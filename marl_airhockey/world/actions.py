@@ -64,7 +64,7 @@ class Actions:
         """Fill the actions, prescribed motions and closed goals of a step.
 
         Args:
-            step: its ``action``, ``prescribed`` and ``closed`` are filled.
+            step: its ``action``, ``prescribed``, ``closed`` and ``raised`` are filled.
             actions: (B, open, 2) of the open seats.
             sensed: state that drivers see, table frame.
             memory: of the scenario.
@@ -79,6 +79,7 @@ class Actions:
             )
         if self._prescribes:
             step.prescribed[:], step.closed[:] = np.nan, False
+            step.raised[:] = False
             self._prescribes = False
         if not self._driven:
             step.action[:] = actions
@@ -96,7 +97,9 @@ class Actions:
         retired = self._scenario.retired(memory)
         if retired is not None and retired.any():
             seats, self._prescribes = self._retired_seats, True
-            seats.retire(retired, step.action, step.prescribed, step.closed)
+            seats.retire(
+                *(retired, step.action, step.prescribed, step.closed, step.raised)
+            )
         if self._delay is not None:
             delay = episode.physics["action_delay"]
             step.action[:] = self._delay.push(step.action, delay)

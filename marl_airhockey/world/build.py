@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.physics import Physics, Value
+from marl_airhockey.core.physics import Given, Physics
 from marl_airhockey.jit.threads import threads
 from marl_airhockey.registry import (
     DEFAULT_BACKEND,
@@ -31,7 +31,7 @@ class Keywords(TypedDict, total=False):
     profile: str
     observe: str
     goals: str
-    physics: Mapping[str, Value]
+    physics: Given
     control_dt: float
     substeps: int
     max_cycles: int
@@ -59,9 +59,11 @@ def build_world(
             observe: "velocity" (in the ideal profile), "history" (in the robot
                 profile) or "pixels".
             goals: "flat" or "dict".
-            physics: parameters by name, values or (low, high) drawn per episode.
+            physics: a preset's name, a TOML file, or parameters by name, values or
+                (low, high) drawn per episode, which may name a ``preset``.
             control_dt: s between two actions (0.05).
-            substeps: physics steps in one control step (the backend's own).
+            substeps: least number of physics steps in one control step (the
+                backend's own); not for numba, which has none.
             max_cycles: length of an episode in control steps.
             options: the scenario's own fields.
 
@@ -86,7 +88,7 @@ def build_world(
     if reason:
         raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
     control_dt = keywords.get("control_dt", 0.05)
-    substeps = keywords.get("substeps", kind.default_substeps)
+    substeps = keywords.get("substeps")
     max_cycles = keywords.get("max_cycles")
     _check_times(control_dt, substeps, max_cycles)
     profile = keywords.get("profile", "ideal")
@@ -111,10 +113,13 @@ def build_world(
     )
 
 
-def _check_times(control_dt: float, substeps: int, max_cycles: int | None) -> None:
+def _check_times(
+    control_dt: float, substeps: int | None, max_cycles: int | None
+) -> None:
     if not 0.001 <= control_dt <= 1.0:
         raise ValueError(f"control_dt: {control_dt} s must be in 0.001 .. 1")
-    if isinstance(substeps, bool) or not isinstance(substeps, int) or substeps < 1:
+    whole = isinstance(substeps, int) and not isinstance(substeps, bool)
+    if substeps is not None and not (whole and substeps >= 1):
         raise ValueError(
             f"substeps: {substeps!r} must be a whole number above 0: control_dt is a "
             "multiple of the simulation's step"

@@ -72,9 +72,10 @@ class ControlStep:
         b, seats = len(limit), len(reach.share)
         self.action = np.zeros((b, seats, 2))
         """(B, seats, 2) actions after their delay: fractions of top speed, ego frames;
-        to be filled, like the next two"""
+        to be filled, like the next three"""
         still = Command.still(backend.scene, b)
         self.prescribed, self.closed = still.prescribed, still.closed
+        self.raised = still.raised
         self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
         self._now = 0
         self._pipelines: list[Pipeline] = []
@@ -128,7 +129,7 @@ class ControlStep:
             after.limited,
         )
         velocity = after.limited.velocity
-        command = Command(velocity, self.prescribed, self.closed)
+        command = Command(velocity, self.prescribed, self.closed, self.raised)
         step = Step(
             *(state, velocity, after.state, before.verdict.memory),
             *(before.episode, self._limit),

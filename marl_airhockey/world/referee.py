@@ -68,10 +68,13 @@ class Referee:
         scenario: whose rules.
         rotations: (S, 2, 2) from the table frame to each seat's ego frame.
         show: shows the new state, in the same loop.
+        exact: whether paddles move as commanded, unless something stops them.
     """
 
-    def __init__(self, scenario: Scenario, rotations: Array, show: Show) -> None:
-        self.scenario, self._show = scenario, show
+    def __init__(
+        self, scenario: Scenario, rotations: Array, show: Show, exact: bool
+    ) -> None:
+        self.scenario, self._show, self._exact = scenario, show, exact
         self._rotations = rotations
         self._straight = bool((rotations == np.eye(2)).all())
         self._fused = Fused(self._judge, scenario.name)
@@ -117,9 +120,10 @@ class Referee:
             fresh = counters["success"].any(-1) & ~episode["success"].any(-1)
             few = t.new_memory["touches"].sum((-1, -2)) <= 1
             counters["first_shot"] = episode["first_shot"] | (fresh & few)
-        rotated = command
+        # What a paddle could not do, as a puck or another paddle was in its way.
+        rotated = after.paddle_velocity if self._exact else command
         if not self._straight:
-            rotated = (self._rotations @ command[..., None])[..., 0]
+            rotated = (self._rotations @ rotated[..., None])[..., 0]
         share = rotated / physics["paddle_speed"][..., None, None]
         outcome = {
             "reward": reward,

@@ -25,17 +25,23 @@ class RetiredSeats:
         self._owner = np.array(owners, np.int64)
 
     def retire(
-        self, retired: Array, action: Array, prescribed: Array, closed: Array
+        self,
+        retired: Array,
+        action: Array,
+        prescribed: Array,
+        closed: Array,
+        raised: Array,
     ) -> None:
-        """Park the paddles of retired seats and close their goals, in place.
+        """Lift the paddles of retired seats off and close their goals, in place.
 
         Args:
             retired: (B, seats) bool.
             action: (B, seats, 2) see `ControlStep`, as the next two.
             prescribed: (B, seats, 4).
             closed: (B, goal_lines).
+            raised: (B, seats).
         """
-        action[retired] = 0.0
+        action[retired], raised[retired] = 0.0, True
         parking = np.broadcast_to(self._parking, prescribed.shape)
         prescribed[retired] = parking[retired]
         closed[:] = retired[:, self._owner] & (self._owner >= 0)

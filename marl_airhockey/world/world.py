@@ -64,7 +64,8 @@ class World:
             DrivenSeat(seat, driver, self.observer, b, dt)
             for seat, driver in sorted(drivers.items())
         ]
-        self.referee = Referee(scenario, self.reach.rotation, self.observer.show)
+        show, exact = self.observer.show, backend.ideal
+        self.referee = Referee(scenario, self.reach.rotation, show, exact)
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
         self._seeded, self.seeds = False, np.zeros(b, np.int64)
         """(B,) seed of each world"""

@@ -23,7 +23,7 @@ class Bench:
         self.scene = Scene(table, (make_seat("robot", table, 0),), pucks=pucks, **scene)
         kind = find_backend(backend)
         self.refused = kind.supports(self.scene)
-        self.backend = kind(self.scene, 1, DT, kind.default_substeps)
+        self.backend = kind(self.scene, 1, DT)
         values = FLAT | (physics or {})
         rows = {name: np.full(1, value) for name, value in values.items()}
         self.backend.set_physics(rows, np.arange(1))

@@ -25,6 +25,7 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
 from marl_airhockey.contracts.scenario import Transition
+from marl_airhockey.core.state import ARRAYS
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import gymnasium_id
 
@@ -179,11 +180,9 @@ def test_judging_a_recording_equals_judging_step_by_step(scenario, backend):
     def stack(name):
         return np.stack([getattr(s, name) for s in states])
 
-    names = ("position", "velocity", "angle", "spin", "touched", "touched_at")
-    names += ("touching", "banked", "crossed", "crossed_velocity", "visible", "time")
     path = None if states[0].path is None else stack("path")
     recording = type(states[1])(
-        game.scene.bodies, *(stack(name) for name in names), path=path
+        game.scene.bodies, **{name: stack(name) for name in ARRAYS}, path=path
     )
     command = np.stack(command)
     memory = game.replay_memory(start, recording, command)

@@ -32,7 +32,7 @@ def test_the_physics_of_another_table_are_found(tmp_path):
     path.write_text(found.to_toml())
     assert load_physics(path) == pytest.approx(found.physics, rel=1e-4)
     path.write_text("tilt =")
-    with pytest.raises(ValueError, match="no preset of physics"):
+    with pytest.raises(ValueError, match="no TOML file"):
         load_physics(path)
 
 

@@ -13,30 +13,32 @@ from marl_airhockey.types import Array
 def follow(
     velocity: Array,
     prescribed: Array,
+    above: Array,
     position: Array,
     dt: float,
     goal: Array,
     imposed: Array,
-    lifted: Array,
+    raised: Array,
 ) -> None:
-    """Compute the velocities of paddles, and which are prescribed or lifted.
+    """Compute the velocities of paddles, and which are prescribed or raised.
 
     Args:
         velocity: (B, paddles, 2) commanded, m/s.
         prescribed: (B, paddles, 4) position and velocity at the end of the step, nan
             for paddles that follow their command.
+        above: (B, paddles) bool: commanded to be raised.
         position: (B, N, 2) m, paddles first.
         dt: length of the step, s.
         goal: (B, paddles, 2) m/s at the end of the step, filled; that of a prescribed
             paddle holds during the whole step.
         imposed: (B, paddles) bool, filled: True if prescribed.
-        lifted: (B, paddles) bool, filled: True if faster than `MAX_PRESCRIBED_SPEED`,
-            so that it moves above the table.
+        raised: (B, paddles) bool, filled: True above the table, where it touches
+            nothing: as commanded, or prescribed faster than `MAX_PRESCRIBED_SPEED`.
     """
     for b in range(len(goal)):
         for i in range(goal.shape[1]):
             goal[b, i, 0], goal[b, i, 1] = velocity[b, i, 0], velocity[b, i, 1]
-            imposed[b, i] = lifted[b, i] = False
+            imposed[b, i], raised[b, i] = False, above[b, i]
             if np.isnan(prescribed[b, i, 0]):
                 continue
             imposed[b, i] = True
@@ -44,7 +46,7 @@ def follow(
                 distance = prescribed[b, i, axis] - position[b, i, axis]
                 goal[b, i, axis] = distance / dt
             speed = np.hypot(goal[b, i, 0], goal[b, i, 1])
-            lifted[b, i] = speed > MAX_PRESCRIBED_SPEED
+            raised[b, i] |= speed > MAX_PRESCRIBED_SPEED
 
 
 @njit(cache=True)
@@ -53,7 +55,7 @@ def ramp_paddles(
     velocity: Array,
     goal: Array,
     prescribed: Array,
-    lifted: Array,
+    raised: Array,
     left: int,
     dt: float,
     diameter: float,
@@ -66,7 +68,7 @@ def ramp_paddles(
         velocity: (paddles, 2) m/s.
         goal: (paddles, 2) m/s after the ``left`` remaining substeps.
         prescribed: (paddles,) bool: moves at its goal velocity and does not yield.
-        lifted: (paddles,) bool: touches nothing.
+        raised: (paddles,) bool: touches nothing.
         left: number of remaining substeps of the ramp.
         dt: length of a substep, s.
         diameter: distance of two centres in contact, m.
@@ -83,7 +85,7 @@ def ramp_paddles(
             mean[i, axis] = velocity[i, axis] + 0.5 * ramp
             position[i, axis] += mean[i, axis] * dt
             velocity[i, axis] += ramp
-    overlap = separate_paddles(position, velocity, prescribed, lifted, diameter)
+    overlap = separate_paddles(position, velocity, prescribed, raised, diameter)
     if overlap:
         mean[:] = velocity
     return overlap
@@ -91,7 +93,7 @@ def ramp_paddles(
 
 @njit(cache=True)
 def separate_paddles(
-    position: Array, velocity: Array, prescribed: Array, lifted: Array, diameter: float
+    position: Array, velocity: Array, prescribed: Array, raised: Array, diameter: float
 ) -> bool:
     """Separate overlapping paddles in place; return True if any pair overlapped.
 
@@ -103,7 +105,7 @@ def separate_paddles(
         position: (paddles, 2) m, changed in place.
         velocity: (paddles, 2) m/s, changed in place.
         prescribed: (paddles,) bool.
-        lifted: (paddles,) bool: touches nothing.
+        raised: (paddles,) bool: touches nothing.
         diameter: distance of two centres in contact, m.
     """
     overlap = False
@@ -114,7 +116,7 @@ def separate_paddles(
             distance = np.sqrt(nx * nx + ny * ny)
             if distance >= diameter or (prescribed[i] and prescribed[j]):
                 continue
-            if lifted[i] or lifted[j]:
+            if raised[i] or raised[j]:
                 continue
             overlap = True
             if distance > 1e-9:

@@ -6,33 +6,70 @@ from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import reaches
+from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
-FALL, FADE, FLIGHT_FADE, FLIGHT_FALL, FLIGHT_DISTANCE, FLIGHT_DROP = range(6)
-WALL, PADDLE, BLOCK, PUCK_MASS, BLOCK_MASS, FRICTION = range(6, 12)
-COEFFICIENTS = 12
-"""Columns of a world's coefficients: speed that a substep takes from a puck's vx (m/s)
-and share of its speed that it leaves (1); the same for a whole step, and the distance
-(s, times the speed) and drop (m) in it; restitutions, masses (kg) and speed that
-friction takes from a block in a substep (m/s)."""
+PULL_X, PULL_Y, DAMPING, DRAG = range(4)
+WALL, WALL_SLOPE, WALL_MU, PADDLE, PADDLE_MU, PUCK, PUCK_MU, BLOCK = range(4, 12)
+PUCK_MASS, BLOCK_MASS, BLOCK_GRIP, PULL = range(12, 16)
+COEFFICIENTS = 16
+"""Columns of a world's coefficients: acceleration by the slope (m/s2), linear (1/s) and
+quadratic drag (1/m); restitution at walls, its loss per ln(m/s), and friction there;
+restitutions and frictions of paddles and pucks, restitution of blocks; masses (kg),
+deceleration of sliding blocks, and the size of the slope's acceleration (m/s2)."""
 
 
-def make_coefficients(
-    values: dict[str, Array], control_dt: float, substeps: int
-) -> Array:
-    """Return (B, COEFFICIENTS) from physical parameters (B,); `pull` in m/s2."""
-    dt = control_dt / substeps
-    fall, fade = values["pull"] * dt, np.exp(-values["puck_damping"] * dt)
-    # x and v are linear in the initial v: sum the substeps with v = 1 and v = 0.
-    speed, drop = np.ones_like(fall), np.zeros_like(fall)
-    distance, lost = np.zeros_like(fall), np.zeros_like(fall)
-    for _ in range(substeps):
-        distance, lost = distance + speed * dt, lost + drop * dt
-        speed, drop = speed * fade, drop * fade - fall
-    names = ("wall_restitution", "paddle_restitution", "block_restitution")
-    rest = [values[n] for n in (*names, "puck_mass", "block_mass")]
-    friction = values["block_friction"] * dt
-    return np.stack([fall, fade, speed, drop, distance, lost, *rest, friction], axis=-1)
+def make_coefficients(values: dict[str, Array]) -> Array:
+    """Return (B, COEFFICIENTS) from physical parameters (B,)."""
+    names = (
+        *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
+        *("wall_friction", "paddle_restitution", "paddle_friction"),
+        *("puck_restitution", "puck_friction", "block_restitution"),
+        *("puck_mass", "block_mass", "block_friction"),
+    )
+    pull_x = -GRAVITY * np.sin(np.radians(values["tilt"]))
+    pull_y = -GRAVITY * np.sin(np.radians(values["cross_tilt"]))
+    columns = [pull_x, pull_y, *(values[n] for n in names), np.hypot(pull_x, pull_y)]
+    return np.stack(columns, axis=-1)
+
+
+NORMAL_X, NORMAL_Y, OFFSET, MIDDLE_X, MIDDLE_Y, SIGN, HALF = range(7)
+"""Columns of a wall: inward normal, distance of its line from the origin (m), middle of
+its side (m), and the part of the line that is wall: where the distance along it from
+the middle, times ``SIGN``, is at least ``HALF`` (m; -inf for all of the line)."""
+
+
+def make_walls(scene: Scene) -> tuple[Array, Array, Array, int]:
+    """Return the walls of a scene: one per side, or two beside an open goal line.
+
+    The edges of the seats' reaches follow, E of each seat, which hold its paddle alone.
+
+    Returns:
+        Walls (F + S E, 7), the sides of the first ones (F,), for each goal line (M, 2)
+        its side and the first of its two walls, -1 where the line is a whole side, and
+        E.
+    """
+    table = scene.table
+    rows: list[list[float]] = []
+    owner: list[int] = []
+    lines = np.full((len(scene.goal_lines), 2), -1, np.int64)
+    for side in range(len(table.vertices)):
+        start, end = table.ends(side)
+        line = [*table.normals[side], table.offsets[side], *(start + end) / 2]
+        widths = [m.width for m in scene.goal_lines if m.side == side and m.width]
+        for m, goal_line in enumerate(scene.goal_lines):
+            if goal_line.side == side:
+                lines[m] = side, len(rows) if goal_line.width else -1
+        ends = [(1.0, max(widths) / 2), (-1.0, max(widths) / 2)] if widths else []
+        for part in ends or [(1.0, -np.inf)]:
+            rows.append([*line, *part])
+            owner.append(side)
+    normals, offsets = reaches(table, scene.seats)
+    for normal, offset in zip(normals.reshape(-1, 2), offsets.ravel(), strict=True):
+        rows.append([*normal, offset + table.paddle_radius, 0.0, 0.0, 1.0, -np.inf])
+    return np.array(rows), np.array(owner), lines, normals.shape[1]
 
 
 class Static(NamedTuple):
@@ -43,15 +80,15 @@ class Static(NamedTuple):
     blocks: int
     radius: Array
     """Radii of the bodies (N,), m"""
-    lines: Array
-    """Result of `walls.sides`"""
+    walls: Array
+    """Walls (F + S E, 7): see `make_walls`, like the next three"""
+    wall_side: Array
     goal_lines: Array
-    """Side of each goal line, and 1 if it is that whole side (M, 2)"""
+    edges: int
     obstacles: Array
-    """Obstacles (O, 5): see `contacts.contact_obstacle`"""
+    """Obstacles (O, 5): x, y of both ends of a segment, and the radius around it, m"""
     control_dt: float
     """Length of a control step, s"""
-    substeps: int
 
 
 class Commands(NamedTuple):
@@ -62,55 +99,48 @@ class Commands(NamedTuple):
     (B, paddles, 2), m/s"""
     prescribed: Array
     """True if the paddle moves at its velocity and does not yield (B, paddles)"""
-    lifted: Array
+    raised: Array
     """True if the paddle touches nothing (B, paddles)"""
     closed: Array
     """True if the goal line is wall (B, M)"""
 
 
 class Previous(NamedTuple):
-    """State before the step, read-only."""
+    """State before the step, read-only; names as in `State`."""
 
     position: Array
-    """(B, N, 2) m"""
     velocity: Array
-    """(B, N, 2) m/s"""
+    angle: Array
+    spin: Array
     touching: Array
-    """True if in contact (B, paddles, pucks)"""
     time: Array
-    """(B,) s"""
 
 
-class Motion(NamedTuple):
-    """Motion of all bodies, filled; `push` persists between steps."""
+class Result(NamedTuple):
+    """State after the step, filled; names as in `State`, but for the last three."""
 
     position: Array
-    """(B, N, 2) m"""
     velocity: Array
-    """(B, N, 2) m/s"""
-    path: Array
-    """Columns x, y, vx, vy (B, substeps + 1, movers, 4), or (B, 0, movers, 4) if the
-    scene does not require it"""
-    push: Array
-    """Correction of overlaps that the next substep applies (B, movers, 2), m"""
+    angle: Array
+    spin: Array
     time: Array
-    """(B,) s"""
-
-
-class Events(NamedTuple):
-    """Events of pucks, filled; the last two persist between steps."""
-
     touched: Array
-    """Contacts (B, paddles, pucks); this and the next five as in `State`"""
     touched_at: Array
     touching: Array
     banked: Array
     crossed: Array
     crossed_velocity: Array
+    lifted: Array
+    path: Array
+    """Columns x, y, vx, vy (B, moments + 1, movers, 4), or (B, 0, movers, 4) if the
+    scene does not require it"""
     against: Array
-    """True if the puck touches the wall of that side (B, pucks, sides)"""
+    """True if the puck touches the wall of that side (B, pucks, sides); persists"""
     out: Array
-    """True if the puck is out of play (B, pucks)"""
+    """True if the puck is out of play (B, pucks); persists"""
+    pinned: Array
+    """Time for which a prescribed paddle has left the puck no room (B, pucks), s;
+    persists"""
 
 
 class Batch(NamedTuple):
@@ -121,5 +151,4 @@ class Batch(NamedTuple):
     """Coefficients of the laws (B, COEFFICIENTS)"""
     commands: Commands
     previous: Previous
-    motion: Motion
-    events: Events
+    result: Result

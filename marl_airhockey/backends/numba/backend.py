@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from marl_airhockey.backends._planar.walls import sides
 from marl_airhockey.backends.numba.arrays import (
-    COEFFICIENTS,
     Static,
     make_coefficients,
+    make_walls,
 )
-from marl_airhockey.backends.numba.contacts import find_leaning
-from marl_airhockey.backends.numba.kernel import advance
+from marl_airhockey.backends.numba.geometry import find_leaning
+from marl_airhockey.backends.numba.kernel import advance, work_space
 from marl_airhockey.contracts.backend import Backend, Command
+from marl_airhockey.core.physics import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import RESULTS, State
-from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
@@ -27,35 +25,42 @@ class NumbaBackend(Backend):
     """Backend with B worlds as rows of arrays, stepped by compiled `kernel.advance`."""
 
     exact: ClassVar[bool] = True
-    default_substeps: ClassVar[int] = 10
+    timestep: ClassVar[float | None] = None
 
     def __init__(
-        self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
+        self,
+        scene: Scene,
+        num_worlds: int,
+        control_dt: float,
+        substeps: int | None = None,
     ) -> None:
         super().__init__(scene, num_worlds, control_dt, substeps)
         bodies, b = scene.bodies, num_worlds
-        lines = [(line.side, line.width is None) for line in scene.goal_lines]
         obstacles = [(*o.start, *(o.end or o.start), o.radius) for o in scene.obstacles]
         self._static = Static(
-            bodies.paddles,
-            bodies.pucks,
-            bodies.blocks,
-            np.array(bodies.radius),
-            sides(scene),
-            np.array(lines, np.int64).reshape(-1, 2),
+            *(bodies.paddles, bodies.pucks, bodies.blocks, np.array(bodies.radius)),
+            *make_walls(scene),
             np.array(obstacles, np.float64).reshape(-1, 5),
             control_dt,
-            substeps,
         )
-        seats, table_sides = (b, bodies.paddles), len(scene.table.vertices)
-        self._coefficients = np.zeros((b, COEFFICIENTS))
+        seats, pucks = (b, bodies.paddles), (b, bodies.pucks)
+        defaults = {name: np.full(b, p.default) for name, p in PARAMETERS.items()}
+        self._coefficients = make_coefficients(defaults)
         self._goal = np.zeros((*seats, 2))
         self._imposed = np.zeros(seats, np.bool_)
-        self._lifted = np.zeros(seats, np.bool_)
-        self._push = np.zeros((b, bodies.movers, 2))
-        self._against = np.zeros((b, bodies.pucks, table_sides), np.bool_)
-        self._out = np.zeros((b, bodies.pucks), np.bool_)
+        self._raised = np.zeros(seats, np.bool_)
+        self._against = np.zeros((*pucks, len(scene.table.vertices)), np.bool_)
+        self._out = np.zeros(pucks, np.bool_)
+        self._pinned = np.zeros(pucks)
+        self._work = work_space(self._static, b)
         self._pathless = np.zeros((b, 0, bodies.movers, 4))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_work": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._work = work_space(self._static, self.num_worlds)
 
     @classmethod
     def supports(cls, scene: Scene) -> str | None:
@@ -67,33 +72,27 @@ class NumbaBackend(Backend):
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         rows = {name: value[worlds] for name, value in values.items()}
-        rows["pull"] = GRAVITY * np.sin(np.radians(rows["tilt"]))
-        made = make_coefficients(rows, self.control_dt, self.substeps)
-        self._coefficients[worlds] = made
+        self._coefficients[worlds] = make_coefficients(rows)
 
     def reset(self, state: State, worlds: Array) -> None:
         super().reset(state, worlds)
-        self._push[worlds] = 0.0
-        self._out[worlds] = False
-        radius = self.scene.table.puck_radius
-        find_leaning(worlds, state.puck, radius, self._static.lines, self._against)
-
-    def empty_state(self) -> State:
-        # Discs have no spin here: their angles stay, and states share them.
-        rest = self._rest
-        return replace(super().empty_state(), angle=rest.angle, spin=rest.spin)
+        self._out[worlds], self._pinned[worlds] = False, 0.0
+        static, radius = self._static, self.scene.table.puck_radius
+        find_leaning(
+            *(worlds, state.puck, radius, static.walls, static.wall_side),
+            self._against,
+        )
 
     def stage(self, command: Command, before: State, after: State) -> Stage:
         static = [Fixed(x) if isinstance(x, np.ndarray) else x for x in self._static]
-        given = ("position", "velocity", "touching", "time")
-        filled = [name for name in RESULTS if name not in ("angle", "spin")]
+        given = ("position", "velocity", "angle", "spin", "touching", "time")
         arguments = (
             *(*static, self._coefficients, *command),
-            *(self._goal, self._imposed, self._lifted),
+            *(self._goal, self._imposed, self._raised),
             *(getattr(before, name) for name in given),
-            *(getattr(after, name) for name in filled),
+            *(getattr(after, name) for name in RESULTS),
             self._pathless if after.path is None else after.path,
-            *(self._push, self._against, self._out),
+            *(self._against, self._out, self._pinned, *self._work),
         )
         return Stage(advance, arguments)
 

@@ -1,8 +1,7 @@
 """Kernel of the 2D table: one control step of B worlds in one compiled loop.
 
-A world without a contact in the step is advanced in closed form; any other one substep
-by substep by the laws of `contacts`. Both give the same numbers but for rounding, so
-that most steps cost only a few distances.
+A world in which nothing can meet moves in one piece. Any other one moves from contact
+to contact: `drift` finds the first touch on the way, `impacts` what comes of it.
 """
 
 from __future__ import annotations
@@ -10,42 +9,80 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from marl_airhockey.backends._planar.paddles import follow, separate_paddles
-from marl_airhockey.backends._planar.walls import SQUEEZE, slide_out, wall
+from marl_airhockey.backends._planar.paddles import follow
 from marl_airhockey.backends.numba.arrays import (
     BLOCK,
     BLOCK_MASS,
-    FADE,
-    FALL,
-    FRICTION,
+    HALF,
     PADDLE,
+    PADDLE_MU,
     PUCK_MASS,
+    PUCK_MU,
     WALL,
+    WALL_MU,
+    WALL_SLOPE,
     Batch,
     Commands,
-    Events,
-    Motion,
     Previous,
+    Result,
     Static,
 )
-from marl_airhockey.backends.numba.contacts import (
+from marl_airhockey.backends.numba.arrays import PUCK as PUCK_RESTITUTION
+from marl_airhockey.backends.numba.drift import drift, list_near, longest_drift
+from marl_airhockey.backends.numba.flight import clear_events, fly_freely
+from marl_airhockey.backends.numba.geometry import (
+    NEAR,
+    RELEASE,
+    ahead_of_mouth,
+    in_contact,
+)
+from marl_airhockey.backends.numba.impacts import (
+    ANGLE,
+    ASKS,
+    AWAY,
+    BODY,
+    EDGE,
+    FRICTION,
+    GX,
+    GY,
+    MASS,
+    NX,
+    NY,
+    PINNED,
+    PRESCRIBED,
+    PUCK,
+    RADIUS,
+    REACH,
+    RESTITUTION,
     SLOP,
-    bounce,
-    cap,
-    contact_disc,
-    contact_obstacle,
-    contact_side,
-    friction_share,
-    passes_line,
-    penetration_correction,
+    SPIN,
+    TINY,
+    VX,
+    VY,
+    X,
+    Y,
+    closing,
+    distance_between,
+    solve,
+    take_apart,
 )
-from marl_airhockey.backends.numba.free_flight import (
-    carry_over,
-    find_collisions,
-    fly_freely,
-)
-from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.backends.numba.impacts import BLOCK as BLOCK_ROLE
+from marl_airhockey.contracts.backend import PATIENCE
+from marl_airhockey.core.laws import cap, wall_restitution
+from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
+
+
+def work_space(static: Static, worlds: int) -> tuple[Array, Array]:
+    """Return the work space of a kernel for B worlds, of which parts use one row.
+
+    Rows that are not used take no memory.
+    """
+    movers = static.paddles + static.pucks + static.blocks
+    walls = len(static.walls)
+    size = movers * (movers + walls + len(static.obstacles))
+    floats = movers * (BODY + 3) + 4 * size + static.walls.size
+    return np.zeros((worlds, floats)), np.zeros((worlds, movers + 5 * size), np.int64)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -54,24 +91,30 @@ def advance(
     pucks: int,
     blocks: int,
     radius: Array,
-    lines: Array,
+    walls: Array,
+    wall_side: Array,
     goal_lines: Array,
+    edges: int,
     obstacles: Array,
     control_dt: float,
-    substeps: int,
     coefficients: Array,
     command: Array,
     prescribed: Array,
     closed: Array,
+    above: Array,
     goal: Array,
     imposed: Array,
-    lifted: Array,
+    raised: Array,
     previous_position: Array,
     previous_velocity: Array,
+    previous_angle: Array,
+    previous_spin: Array,
     previous_touching: Array,
     previous_time: Array,
     position: Array,
     velocity: Array,
+    angle: Array,
+    spin: Array,
     time: Array,
     touched: Array,
     touched_at: Array,
@@ -79,39 +122,40 @@ def advance(
     banked: Array,
     crossed: Array,
     crossed_velocity: Array,
+    lifted: Array,
     path: Array,
-    push: Array,
     against: Array,
     out: Array,
+    pinned: Array,
+    work: Array,
+    indices: Array,
 ) -> None:
     """Move B worlds by a control step, in place.
 
     The arrays of a `Batch` are single arguments: numba is slow to unbox tuples of
-    arrays from Python, and Python to build them. ``command``, ``prescribed`` and
-    ``closed`` are those of a `contracts.backend.Command`; the next three are filled.
+    arrays from Python, and Python to build them. ``command``, ``prescribed``,
+    ``closed`` and ``above`` are those of a `contracts.backend.Command`; the next three
+    are filled.
     """
     static = Static(
-        *(paddles, pucks, blocks, radius, lines, goal_lines, obstacles),
-        *(control_dt, substeps),
+        *(paddles, pucks, blocks, radius, walls, wall_side, goal_lines),
+        *(edges, obstacles, control_dt),
     )
-    follow(command, prescribed, previous_position, control_dt, goal, imposed, lifted)
-    commands = Commands(goal, imposed, lifted, closed)
+    ways = command, prescribed, above, previous_position
+    follow(*ways, control_dt, goal, imposed, raised)
+    commands = Commands(goal, imposed, raised, closed)
     previous = Previous(
-        previous_position, previous_velocity, previous_touching, previous_time
+        *(previous_position, previous_velocity, previous_angle, previous_spin),
+        *(previous_touching, previous_time),
     )
-    motion = Motion(position, velocity, path, push, time)
-    events = Events(
-        *(touched, touched_at, touching, banked, crossed, crossed_velocity),
-        *(against, out),
+    result = Result(
+        *(position, velocity, angle, spin, time, touched, touched_at, touching),
+        *(banked, crossed, crossed_velocity, lifted, path, against, out, pinned),
     )
-    batch = Batch(static, coefficients, commands, previous, motion, events)
-    carry_over(batch)
-    may_collide = np.ones(len(coefficients), np.bool_)
-    if motion.path.shape[1] == 0:
-        find_collisions(batch, may_collide)
-        fly_freely(batch, may_collide)
-    if may_collide.any():
-        _substeps(batch, may_collide)
+    batch = Batch(static, coefficients, commands, previous, result)
+    busy = np.empty(len(coefficients), np.bool_)
+    if fly_freely(batch, busy):
+        _advance_busy(batch, busy, work, indices)
     for b in range(len(goal)):
         for i in range(paddles):
             if imposed[b, i]:
@@ -120,273 +164,256 @@ def advance(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _substeps(batch: Batch, may_collide: Array) -> None:
-    """Move the worlds that may have contacts, substep by substep.
+def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None:
+    """Move the worlds in which something may meet, from contact to contact.
 
-    Each inner function is one phase of a substep; numba inlines them, which saves the
-    reference counts of a dozen arrays at every call.
+    Each inner function is one phase; numba inlines them, which saves the reference
+    counts of a dozen arrays at every call.
     """
-    static, coefficients, commands, _, motion, events = batch
-    paddles, pucks, blocks, radius, shared, goal_lines, obstacles = static[:7]
-    control_dt, n = static[7:]
-    lines = shared.copy()
-    goal, prescribed, lifted, closed = commands
-    position, velocity, path, pending, _ = motion
-    touched, touched_at, touching, banked = events[:4]
-    crossed, crossed_velocity, against, out = events[4:]
-    first, movers, dt = paddles + pucks, paddles + pucks + blocks, control_dt / n
-    # Arrays of one world: positions, velocities, those before this substep's forces,
-    # corrections of overlaps; `ramped` is a paddle's velocity so far.
-    p, v = np.zeros((movers, 2)), np.zeros((movers, 2))
-    was, push = np.zeros((movers, 2)), np.zeros((movers, 2))
-    ramped = np.zeros((paddles, 2))
-    weight, spring = np.zeros(movers), np.ones(movers)
-    away, awake = np.zeros(movers, np.bool_), np.zeros(movers, np.bool_)
-    # Pairs that can touch in the rest of the step: bodies and fixed objects, bodies and
-    # bodies, and a flag for paddles. Listed again after every contact, which may make
-    # a body faster.
-    hard = np.zeros((movers * (len(lines) + len(obstacles)), 2), np.int64)
-    soft = np.zeros((movers * movers, 2), np.int64)
-    reach, fresh_bank = np.zeros(movers), np.zeros((pucks, len(lines)), np.bool_)
-    hards, softs = np.zeros(1, np.int64), np.zeros(1, np.int64)
-    fresh, crowd = np.zeros(1, np.bool_), np.zeros(1, np.bool_)
+    static, coefficients, commands, previous, result = batch
+    paddles, pucks, blocks, radius, shared, wall_side = static[:6]
+    goal_lines, edges, obstacles, control_dt = static[6:]
+    sides = len(wall_side)
+    goal, prescribed, raised, closed = commands
+    position, velocity, angle, spin = result[:4]
+    touched, touched_at, touching, banked = result[5:9]
+    crossed, crossed_velocity, lifted, path, against, out, pinned = result[9:]
+    first, movers = paddles + pucks, paddles + pucks + blocks
+    moments, fixed = max(path.shape[1] - 1, 1), len(shared) + len(obstacles)
+    # One world: bodies and their roles, pairs that can meet and those in contact. Views
+    # of work space that the caller owns: counting references to arrays of its own would
+    # cost a sixth of the time.
+    size, at = movers * (movers + fixed), work.ctypes.data
+    m = view(at, (movers, BODY), np.float64)
+    at += 8 * movers * BODY
+    kept = view(at, (movers, 3), np.float64)
+    at += 8 * movers * 3
+    contacts = view(at, (size, 4), np.float64)
+    at += 8 * size * 4
+    walls = view(at, (len(shared), 7), np.float64)
+    walls[:] = shared
+    at = indices.ctypes.data
+    role = view(at, (movers,), np.int64)
+    at += 8 * movers
+    near = view(at, (size, 2), np.int64)
+    at += 8 * size * 2
+    pairs = view(at, (size, 2), np.int64)
+    visits = view(at + 8 * size * 2, (size,), np.int64)
 
-    def enter(b: int, leapfrog_offset: float) -> None:
-        for m in range(len(goal_lines)):
-            side = goal_lines[m, 0]
-            lines[side, 5] = 0.0 if closed[b, m] else shared[side, 5]
+    def enter(b: int) -> None:
+        for g in range(len(goal_lines)):
+            f = goal_lines[g, 1]
+            if f >= 0:
+                walls[f, HALF] = -np.inf if closed[b, g] else shared[f, HALF]
+                walls[f + 1, HALF] = np.inf if closed[b, g] else shared[f + 1, HALF]
         for i in range(movers):
-            for axis in range(2):
-                p[i, axis], v[i, axis] = position[b, i, axis], velocity[b, i, axis]
-                push[i, axis] = pending[b, i, axis]
+            place, motion = previous.position[b, i], previous.velocity[b, i]
+            m[i, X], m[i, Y], m[i, VX], m[i, VY] = (
+                place[0],
+                place[1],
+                motion[0],
+                motion[1],
+            )
+            m[i, RADIUS], m[i, ANGLE] = radius[i], previous.angle[b, i]
+            m[i, SPIN] = m[i, MASS] = m[i, EDGE] = 0.0
             if i < paddles:
-                spring[i], away[i] = coefficients[b, PADDLE], lifted[b, i]
-                for axis in range(2):
-                    here, there = v[i, axis], goal[b, i, axis]
-                    ramped[i, axis] = there if prescribed[b, i] else here
+                role[i] = PRESCRIBED if prescribed[b, i] else ASKS
+                m[i, GX], m[i, GY] = goal[b, i, 0], goal[b, i, 1]
+                if prescribed[b, i]:
+                    m[i, VX], m[i, VY] = m[i, GX], m[i, GY]
+                if raised[b, i]:
+                    role[i] = AWAY
+                for k in range(pucks):
+                    touching[b, i, k] = previous.touching[b, i, k] and not raised[b, i]
             elif i < first:
-                weight[i] = 1.0 / coefficients[b, PUCK_MASS]
-                away[i] = out[b, i - paddles]
-                # Half a substep ahead of the reported velocity (leapfrog).
-                v[i, 0] -= leapfrog_offset
-            else:
-                weight[i] = 1.0 / coefficients[b, BLOCK_MASS]
-                spring[i] = coefficients[b, BLOCK]
-
-    def list_near(b: int, left: int) -> None:
-        for i in range(movers):
-            most = v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1]
-            if i < paddles:
-                gx, gy = goal[b, i, 0], goal[b, i, 1]
-                most = max(most, gx * gx + gy * gy)
-            shift = np.sqrt(push[i, 0] * push[i, 0] + push[i, 1] * push[i, 1])
-            reach[i] = radius[i] + shift
-            reach[i] += (np.sqrt(most) + left * coefficients[b, FALL]) * left * dt
-            awake[i] = i < first or most > 0.0 or shift > 0.0
-            awake[i] |= coefficients[b, FALL] > coefficients[b, FRICTION]
-        hards[0] = softs[0] = 0
-        fresh[0], crowd[0] = True, False
-        for i in range(movers):
-            x, y = p[i, 0], p[i, 1]
-            for j in range(i + 1, paddles):
-                dx, dy, most = p[j, 0] - x, p[j, 1] - y, reach[i] + reach[j]
-                crowd[0] |= dx * dx + dy * dy < most * most
-            for c in range(len(lines) + len(obstacles)):
-                if i < paddles or away[i] or not awake[i]:
-                    continue
-                if c < len(lines):
-                    near = lines[c, 0] * x + lines[c, 1] * y + lines[c, 2] < reach[i]
-                else:
-                    o = c - len(lines)
-                    near = contact_obstacle(x, y, reach[i], obstacles, o)[0] > 0.0
-                if near:
-                    hard[hards[0], 0], hard[hards[0], 1] = i, c
-                    hards[0] += 1
-                elif i < first and c < len(lines):
-                    against[b, i - paddles, c] = False
-            for j in range(max(i + 1, paddles), movers):
-                dx, dy, most = p[j, 0] - x, p[j, 1] - y, reach[i] + reach[j]
-                near = dx * dx + dy * dy < most * most and (awake[i] or awake[j])
-                if near and not (away[i] or away[j]):
-                    soft[softs[0], 0], soft[softs[0], 1] = i, j
-                    softs[0] += 1
-                elif i < paddles and j < first:
-                    touching[b, i, j - paddles] = False
-
-    def drive(b: int, left: int) -> None:
-        for i in range(paddles):
-            for axis in range(2):
-                ramp = (goal[b, i, axis] - ramped[i, axis]) / left
-                v[i, axis] = ramped[i, axis] + 0.5 * ramp
-                p[i, axis] += v[i, axis] * dt
-                ramped[i, axis] += ramp
-        if crowd[0] and separate_paddles(
-            p, ramped, prescribed[b], lifted[b], 2 * radius[0]
-        ):
-            fresh[0] = False
-            for i in range(paddles):
-                v[i, 0], v[i, 1] = ramped[i, 0], ramped[i, 1]
-
-    def move(b: int) -> None:
-        fade, fall = coefficients[b, FADE], coefficients[b, FALL]
-        for i in range(movers):
-            was[i, 0], was[i, 1] = v[i, 0], v[i, 1]
-            if i >= paddles and not away[i]:
-                for axis in range(2):
-                    p[i, axis] += v[i, axis] * dt + push[i, axis]
-                    push[i, axis] = 0.0
-                v[i, 0], v[i, 1] = v[i, 0] * fade - fall, v[i, 1] * fade
-
-    def meet_fixed(b: int) -> None:
-        fresh_bank[:] = False
-        for place in range(hards[0]):
-            i, c = hard[place, 0], hard[place, 1]
-            if c < len(lines):
-                depth, nx, ny = contact_side(p[i, 0], p[i, 1], radius[i], lines, c)
-            else:
-                o = c - len(lines)
-                depth, nx, ny = contact_obstacle(
-                    p[i, 0], p[i, 1], radius[i], obstacles, o
+                role[i] = AWAY if out[b, i - paddles] else PUCK
+                m[i, SPIN], m[i, MASS] = (
+                    previous.spin[b, i],
+                    1.0 / coefficients[b, PUCK_MASS],
                 )
-            if i < first and c < len(lines):
-                k, now = i - paddles, depth > 0.0
-                fresh_bank[k, c] = now and not against[b, k, c]
-                banked[b, k, c] += fresh_bank[k, c]
-                against[b, k, c] = now
-            if depth > 0.0:
-                fresh[0] = False
-                before = nx * was[i, 0] + ny * was[i, 1]
-                rest = min(coefficients[b, WALL], spring[i])
-                gain = bounce(before, nx * v[i, 0] + ny * v[i, 1], rest)
-                back = penetration_correction(depth, nx * push[i, 0] + ny * push[i, 1])
-                v[i, 0] += gain * nx
-                v[i, 1] += gain * ny
-                push[i, 0] += back * nx
-                push[i, 1] += back * ny
+                m[i, EDGE] = 2.0 * m[i, MASS]
+            else:
+                role[i], m[i, MASS] = BLOCK_ROLE, 1.0 / coefficients[b, BLOCK_MASS]
 
-    def pass_lines(b: int, leapfrog_offset: float) -> None:
-        for m in range(len(goal_lines)):
-            s, whole = goal_lines[m, 0], goal_lines[m, 1] == 1
+    def keep_below_the_cap(i: int) -> None:
+        share = cap(m[i, VX], m[i, VY])
+        if share < 1.0:
+            m[i, VX] *= share
+            m[i, VY] *= share
+
+    def leave(b: int) -> None:
+        for i in range(paddles, first):
+            share = cap(m[i, VX], m[i, VY])
+            if share < 1.0:
+                m[i, VX] *= share
+                m[i, VY] *= share
+        for i in range(movers, position.shape[1]):
+            for axis in range(2):
+                position[b, i, axis] = previous.position[b, i, axis]
+                velocity[b, i, axis] = previous.velocity[b, i, axis]
+        for i in range(movers):
+            position[b, i, 0], position[b, i, 1] = m[i, X], m[i, Y]
+            velocity[b, i, 0], velocity[b, i, 1] = m[i, VX], m[i, VY]
+        for k in range(pucks):
+            i = paddles + k
+            angle[b, i] = m[i, ANGLE]
+            held = role[i] == PINNED
+            for j in range(paddles):
+                if role[j] == PRESCRIBED and role[i] == PUCK:
+                    gap, _, _ = distance_between(m, j, i, walls, obstacles)
+                    held |= gap < -RELEASE
+            pinned[b, k] = pinned[b, k] + control_dt if held else 0.0
+            if pinned[b, k] > PATIENCE - 1e-9:
+                lifted[b, k] = out[b, k] = True
+            if out[b, k]:
+                velocity[b, i, 0] = velocity[b, i, 1] = m[i, SPIN] = 0.0
+            spin[b, i] = m[i, SPIN]
+            for j in range(paddles):
+                if touching[b, j, k]:
+                    gap, _, _ = distance_between(m, j, i, walls, obstacles)
+                    touching[b, j, k] = gap <= RELEASE and not out[b, k]
+
+    def part(b: int, i: int, j: int, gap: float) -> None:
+        # Forget a contact that has ended.
+        k = j - paddles
+        if gap > RELEASE and role[j] == PUCK:
+            if 0 <= i < paddles:
+                touching[b, i, k] = False
+            elif i < 0 and -1 - i < sides and walls[-1 - i, HALF] == -np.inf:
+                against[b, k, wall_side[-1 - i]] = False
+
+    def meet(b: int, i: int, j: int, now: float) -> None:
+        # Count a contact that begins.
+        k = j - paddles
+        if role[j] != PUCK or i >= paddles:
+            return
+        if i >= 0:
+            if not touching[b, i, k]:
+                touched[b, i, k] += 1
+                touched_at[b, i, k] = now
+                touching[b, i, k] = True
+        elif -1 - i < sides:
+            side = wall_side[-1 - i]
+            if not against[b, k, side]:
+                banked[b, k, side] += 1
+                against[b, k, side] = True
+                for g in range(len(goal_lines)):
+                    if goal_lines[g, 0] == side and goal_lines[g, 1] < 0:
+                        crossed[b, k, g] = True
+                        crossed_velocity[b, k, g, 0] = m[j, VX]
+                        crossed_velocity[b, k, g, 1] = m[j, VY]
+
+    def touch(b: int, n: int, i: int, j: int, nx: float, ny: float) -> float:
+        # Note a contact with its laws and return its closing speed.
+        row = coefficients[b]
+        speed = closing(m, VX, i, j, nx, ny)
+        restitution, friction = row[PUCK_RESTITUTION], row[PUCK_MU]
+        if role[j] == BLOCK_ROLE:
+            restitution = row[BLOCK]
+            friction = friction if i >= 0 and role[i] == PUCK else 0.0
+        if 0 <= i < paddles and role[j] == PUCK:
+            restitution, friction = row[PADDLE], row[PADDLE_MU]
+        if i < 0:
+            most = 1.0 if role[j] == PUCK else restitution
+            restitution = wall_restitution(-speed, row[WALL], row[WALL_SLOPE])
+            restitution = min(restitution, most)
+            friction = row[WALL_MU] if role[j] == PUCK else 0.0
+        pairs[n, 0], pairs[n, 1] = i, j
+        contacts[n, NX], contacts[n, NY] = nx, ny
+        contacts[n, RESTITUTION], contacts[n, FRICTION] = restitution, friction
+        return speed
+
+    def cross(b: int) -> None:
+        for g in range(len(goal_lines)):
             for k in range(pucks):
                 i = paddles + k
-                if whole:
-                    # Crossed by touching the wall, as found for its wall.
-                    passed = fresh_bank[k, s]
-                else:
-                    passed = not away[i] and passes_line(p[i, 0], p[i, 1], lines, s)
-                    if passed:
-                        out[b, k] = away[i] = True
-                if passed:
-                    crossed[b, k, m] = True
-                    crossed_velocity[b, k, m, 0] = was[i, 0] + leapfrog_offset
-                    crossed_velocity[b, k, m, 1] = was[i, 1]
+                if goal_lines[g, 1] < 0 or role[i] != PUCK:
+                    continue
+                ahead = ahead_of_mouth(m[i, X], m[i, Y], walls, goal_lines[g, 1])
+                if ahead <= 1e-9:
+                    crossed[b, k, g] = out[b, k] = True
+                    crossed_velocity[b, k, g, 0] = m[i, VX]
+                    crossed_velocity[b, k, g, 1] = m[i, VY]
+                    role[i] = AWAY
+                    m[i, VX] = m[i, VY] = m[i, SPIN] = 0.0
 
-    def meet_each_other(b: int, time: float) -> None:
-        for place in range(softs[0]):
-            i, j = soft[place, 0], soft[place, 1]
-            depth, nx, ny = -1.0, 1.0, 0.0
-            if not (away[i] or away[j]):
-                dx, dy = p[j, 0] - p[i, 0], p[j, 1] - p[i, 1]
-                depth, nx, ny = contact_disc(dx, dy, radius[i] + radius[j])
-            if i < paddles and j < first:
-                k, touches = j - paddles, depth > 0.0
-                if touches and not touching[b, i, k]:
-                    touched[b, i, k] += 1
-                    touched_at[b, i, k] = time
-                touching[b, i, k] = touches
-            if depth <= 0.0:
-                continue
-            fresh[0] = False
-            share = weight[i] / (weight[i] + weight[j])
-            other = 1.0 - share
-            before = nx * (was[j, 0] - was[i, 0]) + ny * (was[j, 1] - was[i, 1])
-            now = nx * (v[j, 0] - v[i, 0]) + ny * (v[j, 1] - v[i, 1])
-            taken = nx * (push[j, 0] - push[i, 0]) + ny * (push[j, 1] - push[i, 1])
-            gain = bounce(before, now, min(spring[i], spring[j]))
-            back = penetration_correction(depth, taken)
-            v[i, 0] -= gain * share * nx
-            v[i, 1] -= gain * share * ny
-            v[j, 0] += gain * other * nx
-            v[j, 1] += gain * other * ny
-            push[i, 0] -= back * share * nx
-            push[i, 1] -= back * share * ny
-            push[j, 0] += back * other * nx
-            push[j, 1] += back * other * ny
-
-    def yield_to_sides() -> None:
-        # A body pushed into a wall stays in front of it, as the wall does not yield.
-        for place in range(hards[0]):
-            i, c = hard[place, 0], hard[place, 1]
-            if c < len(lines) and (push[i, 0] != 0.0 or push[i, 1] != 0.0):
-                x, y = p[i, 0] + push[i, 0], p[i, 1] + push[i, 1]
-                depth, nx, ny = contact_side(x, y, radius[i], lines, c)
-                back = max(depth - SLOP, 0.0)
-                push[i, 0] += back * nx
-                push[i, 1] += back * ny
-
-    def hold_blocks(b: int) -> None:
-        for i in range(first, movers):
-            speed = np.sqrt(v[i, 0] * v[i, 0] + v[i, 1] * v[i, 1])
-            share = friction_share(speed, coefficients[b, FRICTION])
-            v[i, 0], v[i, 1] = v[i, 0] * share, v[i, 1] * share
-
-    def settle(b: int, leapfrog_offset: float) -> None:
-        for i in range(paddles, first):
-            vx, vy = v[i, 0] + leapfrog_offset, v[i, 1]
-            share = cap(np.sqrt(vx * vx + vy * vy), PUCK_SPEED_CAP)
-            if share < 1.0:
-                v[i, 0], v[i, 1] = share * vx - leapfrog_offset, share * vy
-            held = False
-            for j in range(paddles):
-                k = i - paddles
-                held |= touching[b, j, k] or touched[b, j, k] > 0
-            if held and wall(lines, radius[i], p[i, 0], p[i, 1], SQUEEZE) >= 0:
-                touch = radius[0] + radius[i]
-                x, y = slide_out(lines, radius[i], p[i, 0], p[i, 1], p[:paddles], touch)
-                p[i, 0], p[i, 1] = x, y
-                push[i, 0] = push[i, 1] = 0.0
-
-    def record(b: int, moment: int, leapfrog_offset: float) -> None:
+    def record(b: int, moment: int) -> None:
         for i in range(path.shape[2]):
-            for axis in range(2):
-                path[b, moment, i, axis] = p[i, axis]
-                speed = ramped[i, axis] if i < paddles else v[i, axis]
-                path[b, moment, i, 2 + axis] = speed
-            path[b, moment, i, 2] += leapfrog_offset if paddles <= i < first else 0.0
-
-    def finish(b: int, leapfrog_offset: float) -> None:
-        for i in range(movers):
-            for axis in range(2):
-                speed = ramped[i, axis] if i < paddles else v[i, axis]
-                position[b, i, axis], velocity[b, i, axis] = p[i, axis], speed
-                pending[b, i, axis] = push[i, axis]
-        for k in range(pucks):
-            velocity[b, paddles + k, 0] += leapfrog_offset
-            if out[b, k]:
-                velocity[b, paddles + k, 0] = velocity[b, paddles + k, 1] = 0.0
+            path[b, moment, i, 0], path[b, moment, i, 1] = m[i, X], m[i, Y]
+            path[b, moment, i, 2], path[b, moment, i, 3] = m[i, VX], m[i, VY]
 
     for b in range(len(coefficients)):
-        if not may_collide[b]:
+        if not busy[b]:
             continue
-        leapfrog_offset = 0.5 * coefficients[b, FALL]
-        enter(b, leapfrog_offset)
-        list_near(b, n)
+        clear_events(batch, b)
+        enter(b)
+        for i in range(paddles, first):
+            keep_below_the_cap(i)
+        left, rounds, moment, count = control_dt, 0, 0, 0
+        stale, solved, bend = True, False, 0.0
+        while True:
+            rounds += 1
+            if stale:
+                count = list_near(
+                    *(m, role, coefficients[b], walls, obstacles, sides, edges),
+                    *(left, near),
+                )
+                bend, stale = longest_drift(m, role, near, count), False
+            n, hits, safe = 0, False, np.inf
+            for k in range(count):
+                i, j = near[k, 0], near[k, 1]
+                gap, nx, ny = distance_between(m, i, j, walls, obstacles)
+                now = control_dt - left
+                if in_contact(gap, closing(m, VX, i, j, nx, ny)):
+                    meet(b, i, j, now)
+                    hits |= touch(b, n, i, j, nx, ny) < -TINY
+                    n += 1
+                else:
+                    part(b, i, j, gap)
+                    reach = m[j, REACH] + (m[i, REACH] if i >= 0 else 0.0)
+                    safe = min(safe, (gap - 2.0 * NEAR) / max(reach, 1e-9))
+            for g in range(len(goal_lines)):
+                for i in range(paddles, first):
+                    f = goal_lines[g, 1]
+                    if f >= 0 and role[i] == PUCK:
+                        ahead = ahead_of_mouth(m[i, X], m[i, Y], walls, f)
+                        safe = min(safe, max(ahead, 0.0) / max(m[i, REACH], 1e-9))
+            if hits and not solved:
+                solve(m, role, VX, pairs, contacts, visits, kept, n)
+                for i in range(paddles, first):
+                    keep_below_the_cap(i)
+                stale = solved = True
+                continue
+            solved = False
+            if path.shape[1] > 0 and moment == 0:
+                record(b, 0)
+                moment = 1
+            if left <= 0.0:
+                break
+            until = left - control_dt * (moments - moment) / moments
+            if path.shape[1] == 0:
+                until = left
+            h = min(max(bend, safe), left, until)
+            if rounds > 60:
+                h = min(max(h, control_dt / 50), left)
+            world = m, role, coefficients[b], walls, obstacles, sides, edges, goal_lines
+            met = pairs, contacts, visits, kept, n
+            h, stale = drift(*world, near, count, *met, left, h, safe, rounds <= 60)
+            left = left - h if left - h > 1e-12 else 0.0
+            cross(b)
+            deep = False
+            for k in range(count):
+                gap, _, _ = distance_between(
+                    m, near[k, 0], near[k, 1], walls, obstacles
+                )
+                deep |= gap < -SLOP
+            if deep:
+                take_apart(m, role, walls, obstacles, sides, edges)
+                stale = True
+            if path.shape[1] > 0 and until - h < 1e-12:
+                if left > 0.0:
+                    record(b, moment)
+                moment += 1
         if path.shape[1] > 0:
-            record(b, 0, leapfrog_offset)
-        for step in range(n):
-            drive(b, n - step)
-            move(b)
-            meet_fixed(b)
-            pass_lines(b, leapfrog_offset)
-            meet_each_other(b, (step + 1) * dt)
-            if blocks > 0:
-                # Friction acts within a contact, which has to return its share.
-                hold_blocks(b)
-                meet_each_other(b, (step + 1) * dt)
-            yield_to_sides()
-            settle(b, leapfrog_offset)
-            if not fresh[0]:
-                list_near(b, n - step - 1)
-            if path.shape[1] > 0:
-                record(b, step + 1, leapfrog_offset)
-        finish(b, leapfrog_offset)
+            record(b, moments)
+        leave(b)

@@ -19,13 +19,19 @@ class PymunkBackend(Backend):
     """Backend with B worlds in plain Python on Chipmunk, the reference for others."""
 
     exact: ClassVar[bool] = True
-    default_substeps: ClassVar[int] = 10
+    timestep: ClassVar[float | None] = 0.005
 
     def __init__(
-        self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
+        self,
+        scene: Scene,
+        num_worlds: int,
+        control_dt: float,
+        substeps: int | None = None,
     ) -> None:
         super().__init__(scene, num_worlds, control_dt, substeps)
-        self.spaces = [Space(scene, control_dt, substeps) for _ in range(num_worlds)]
+        self.spaces = [
+            Space(scene, control_dt, self.substeps) for _ in range(num_worlds)
+        ]
         self._closed = np.zeros((num_worlds, len(scene.goal_lines)), np.bool_)
 
     @classmethod
@@ -43,7 +49,8 @@ class PymunkBackend(Backend):
         super().reset(state, worlds)
         for i in worlds.tolist():
             self.spaces[i].reset(
-                state.position[i], state.velocity[i], state.angle[i], state.touching[i]
+                *(state.position[i], state.velocity[i], state.angle[i], state.spin[i]),
+                state.touching[i],
             )
 
     def stage(self, command: Command, before: State, after: State) -> Stage:
@@ -53,8 +60,9 @@ class PymunkBackend(Backend):
         """Fill ``after`` with the state one control step after ``before``."""
         seats = command.velocity.shape[:2]
         goal = np.zeros((*seats, 2))
-        imposed, lifted = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
-        follow(*command[:2], before.position, self.control_dt, goal, imposed, lifted)
+        imposed, raised = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
+        ways = *command[:2], command.raised, before.position
+        follow(*ways, self.control_dt, goal, imposed, raised)
         after.time[:] = before.time + self.control_dt
         for name in ("position", "velocity", "angle", "spin"):
             getattr(after, name)[:] = getattr(before, name)
@@ -68,9 +76,9 @@ class PymunkBackend(Backend):
                 before.velocity[i, : seats[1]].copy(),
             )
             path = None if after.path is None else after.path[i]
-            space.step(paddles, (goal[i], imposed[i], lifted[i]), path)
-            space.read(rows)
-            rows[: seats[1], 2:] = paddles[1]
+            space.step(paddles, (goal[i], imposed[i], raised[i]), path)
+            space.read(rows, paddles[1])
+            rows[: seats[1], :2] = paddles[0]
             after.position[i, : len(rows)] = rows[:, :2]
             after.velocity[i, : len(rows)] = rows[:, 2:]
             space.read_angles(after.angle[i], after.spin[i])

@@ -37,9 +37,8 @@ class Bodies:
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             self._add(pymunk.Circle(body, scene.table.paddle_radius), PADDLE, i)
         for i in range(scene.pucks):
-            body = pymunk.Body(1.0, float("inf"))
+            body = pymunk.Body(1.0, 1.0)
             self._add(pymunk.Circle(body, scene.table.puck_radius), PUCK, i)
-            self.shapes[-1].elasticity = 1.0
         for i in range(scene.blocks):
             body = pymunk.Body(1.0, float("inf"))
             size = 2 * scene.block_radius

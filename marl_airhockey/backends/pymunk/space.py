@@ -1,7 +1,7 @@
 """World of the pymunk backend: a space with paddles, pucks, blocks, walls and goals.
 
-Velocities in a space are half a substep ahead (leapfrog), so that a falling puck
-follows its parabola exactly; `leapfrog_offset` is added when they are read.
+Within a step, velocities are half a substep ahead (leapfrog), so that a puck follows
+its flight exactly but for terms of third order.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 import pymunk
 
+from marl_airhockey.backends._planar.overlaps import give_way
 from marl_airhockey.backends._planar.paddles import ramp_paddles
-from marl_airhockey.backends._planar.walls import SQUEEZE, sides, slide_out, wall
+from marl_airhockey.backends._planar.walls import depth_in_side, sides
 from marl_airhockey.backends.pymunk.building import (
     BLOCK,
     EVERYTHING,
@@ -22,6 +23,8 @@ from marl_airhockey.backends.pymunk.building import (
     Bodies,
     Walls,
 )
+from marl_airhockey.contracts.backend import PATIENCE
+from marl_airhockey.core.laws import cap, fly, wall_restitution
 from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
@@ -43,7 +46,7 @@ class Space:
     """
 
     def __init__(self, scene: Scene, control_dt: float, substeps: int) -> None:
-        self.scene, self.substeps = scene, substeps
+        self.scene, self.substeps, self.control_dt = scene, substeps, control_dt
         self.dt = control_dt / substeps
         self.space = space = pymunk.Space()
         # Overlap is removed at once; resting contacts keep a tenth of a millimetre.
@@ -56,37 +59,45 @@ class Space:
         self.banked = np.zeros((bodies.pucks, table_sides), np.int64)
         self.crossed = np.zeros((bodies.pucks, lines), np.bool_)
         self.crossed_velocity = np.zeros((bodies.pucks, lines, 2))
+        self.lifted = np.zeros(bodies.pucks, np.bool_)
+        self._pinned = np.zeros(bodies.pucks)
         self.bodies, self._walls = Bodies(space, scene), Walls(space, scene)
-        self._sides, self._substep = sides(scene), 0
+        self._sides, self._elapsed = sides(scene), 0.0
+        self._radius = np.array(bodies.radius)[: bodies.paddles + bodies.pucks]
         self._out: dict[int, tuple[float, float]] = {}
         """Positions at which pucks left play, by puck, m."""
         self._initial_contacts: set[tuple[int, int]] = set()
         """Pairs of puck and side in contact at a reset, which is no new bounce."""
         self._contact = False
         """True if a paddle touches a puck, or a puck has crossed a goal line."""
-        space.on_collision(PADDLE, PUCK, begin=self._touch, separate=self._part)
-        space.on_collision(PUCK, GOAL_LINE, begin=self._cross)
-        space.on_collision(PUCK, WALL, begin=self._bank)
-        for kind in (PADDLE, WALL, GOAL_LINE, BLOCK):
-            space.on_collision(BLOCK, kind, pre_solve=self._soften)
+        space.on_collision(
+            PADDLE, PUCK, begin=self._touch, pre_solve=self._hit, separate=self._part
+        )
+        space.on_collision(PUCK, GOAL_LINE, begin=self._cross, pre_solve=self._bounce)
+        space.on_collision(PUCK, WALL, begin=self._bank, pre_solve=self._bounce)
+        space.on_collision(PUCK, PUCK, pre_solve=self._meet)
+        for kind in (PADDLE, WALL, GOAL_LINE, BLOCK, PUCK):
+            space.on_collision(BLOCK, kind, pre_solve=self._shove)
+        for body in self.bodies.all[bodies.puck]:
+            body.velocity_func = self._glide
         self.set_physics({name: p.default for name, p in PARAMETERS.items()})
 
     def set_physics(self, values: dict[str, float]) -> None:
         """Set the physical parameters by name."""
-        pull = GRAVITY * np.sin(np.radians(values["tilt"]))
-        self.space.gravity = (-float(pull), 0.0)
-        self.space.damping = float(np.exp(-values["puck_damping"]))
-        self.leapfrog_offset = 0.5 * self.dt * float(pull)
+        self._values = values
+        angles = np.radians([values["tilt"], values["cross_tilt"]])
+        self._pull = (
+            -float(GRAVITY * np.sin(angles[0])),
+            -float(GRAVITY * np.sin(angles[1])),
+        )
+        self.space.gravity = self._pull
+        self._drag = values["puck_damping"], values["puck_drag"]
         bodies, half = self.scene.bodies, self.scene.block_radius
-        for shape in self._walls.all:
-            shape.elasticity = values["wall_restitution"]
-        for shape in self.bodies.shapes[bodies.paddle]:
-            shape.elasticity = values["paddle_restitution"]
+        mass, radius = values["puck_mass"], self.scene.table.puck_radius
         for body in self.bodies.all[bodies.puck]:
-            body.mass = values["puck_mass"]
+            body.mass, body.moment = mass, 0.5 * mass * radius**2
         mass, friction = values["block_mass"], values["block_friction"]
         for i, body in enumerate(self.bodies.all[bodies.block]):
-            self.bodies.shapes[bodies.block][i].elasticity = values["block_restitution"]
             body.mass = mass
             self.bodies.friction_joints[2 * i].max_force = mass * friction
             self.bodies.friction_joints[2 * i + 1].max_force = (
@@ -96,7 +107,12 @@ class Space:
                 body.moment = mass * (2 * half) ** 2 / 6
 
     def reset(
-        self, position: Array, velocity: Array, angle: Array, touching: Array
+        self,
+        position: Array,
+        velocity: Array,
+        angle: Array,
+        spin: Array,
+        touching: Array,
     ) -> None:
         """Place all bodies and set the contacts that exist already.
 
@@ -107,6 +123,7 @@ class Space:
             position: (N, 2) m.
             velocity: (N, 2) m/s.
             angle: (N,) rad.
+            spin: (N,) rad/s.
             touching: (paddles, pucks) bool.
         """
         self.space.remove(*self.bodies.shapes)
@@ -114,13 +131,12 @@ class Space:
         pucks = self.scene.bodies.puck
         for i, body in enumerate(self.bodies.all):
             x, y = position[i].tolist()
-            vx, vy = velocity[i].tolist()
-            ahead = self.leapfrog_offset * (pucks.start <= i < pucks.stop)
-            body.position, body.velocity = (x, y), (vx - ahead, vy)
-            if i >= pucks.stop:
-                body.angle, body.angular_velocity = float(angle[i]), 0.0
+            body.position, body.velocity = (x, y), tuple(velocity[i].tolist())
+            if i >= pucks.start:
+                body.angle, body.angular_velocity = float(angle[i]), float(spin[i])
             self.space.reindex_shapes_for_body(body)
         self._out.clear()
+        self._pinned[:] = 0.0
         self.touching[:] = touching
         radius = self.scene.table.puck_radius
         self._contact = True
@@ -128,7 +144,7 @@ class Space:
             (k, side)
             for k, (x, y) in enumerate(position[pucks].tolist())
             for side in range(len(self._sides))
-            if wall(self._sides[side : side + 1], radius, x, y, 0.0) == 0
+            if depth_in_side(self._sides, side, radius, x, y) > 0.0
         }
 
     def step(
@@ -146,16 +162,19 @@ class Space:
                 True if it touches nothing (paddles,).
             path: (substeps + 1, movers, 4), filled; or None.
         """
-        (position, velocity), (goal, imposed, lifted) = paddles, command
+        (position, velocity), (goal, imposed, raised) = paddles, command
         mean, size = np.zeros(goal.shape), 2 * self.scene.table.paddle_radius
         seats = self.scene.bodies.paddle
+        count = self._count(velocity, goal)
+        self.dt, every = self.control_dt / count, count // self.substeps
         self._begin()
-        self._lift(lifted)
+        self._lift(raised)
         if path is not None:
-            self.read(path[0])
-        for k in range(self.substeps):
-            self._substep, left = k, self.substeps - k
-            motion = position, velocity, goal, imposed, lifted, left, self.dt, size
+            self.read(path[0], velocity)
+        self._leap(0.5 * self.dt)
+        for k in range(count):
+            self._elapsed, left = (k + 1) * self.dt, count - k
+            motion = position, velocity, goal, imposed, raised, left, self.dt, size
             overlap = ramp_paddles(*motion, mean)
             for i, body in enumerate(self.bodies.all[seats]):
                 body.velocity = tuple(mean[i].tolist())
@@ -163,26 +182,61 @@ class Space:
                     body.position = tuple((position[i] - mean[i] * self.dt).tolist())
             self.space.step(self.dt)
             if self._contact:
-                self._settle()
-            if path is not None:
-                self.read(path[k + 1])
+                self._settle(position, velocity, imposed, raised)
+            if path is not None and (k + 1) % every == 0:
+                self._leap(-0.5 * self.dt)
+                self.read(path[(k + 1) // every], velocity)
+                self._leap(0.5 * self.dt)
+        self._leap(-0.5 * self.dt)
+        self._keep_below_the_cap()
         self._initial_contacts.clear()
-        self._lift(np.zeros_like(lifted))
+        self._lift(np.zeros_like(raised))
+        self._lift_pinned(position, imposed, raised)
 
-    def read(self, rows: Array) -> None:
+    def _count(self, velocity: Array, goal: Array) -> int:
+        """Return the number of substeps in which nothing moves too far.
+
+        A puck that a paddle hits becomes faster by at most twice its speed.
+        """
+        pucks = self.bodies.all[self.scene.bodies.puck]
+        fastest = max((puck.velocity.length for puck in pucks), default=0.0)
+        paddle = float(max(np.hypot(*velocity.T).max(), np.hypot(*goal.T).max()))
+        most = min(fastest + 2 * paddle, max(PUCK_SPEED_CAP, paddle))
+        way = most * self.control_dt / (self.scene.table.puck_radius / 3)
+        return self.substeps * max(int(np.ceil(way / self.substeps)), 1)
+
+    def _leap(self, time: float) -> None:
+        """Move the velocities of pucks on by a time in free flight, s."""
+        for k, body in enumerate(self.bodies.all[self.scene.bodies.puck]):
+            if k not in self._out:
+                v = body.velocity
+                _, _, vx, vy = fly(v.x, v.y, time, *self._pull, *self._drag)
+                body.velocity = vx, vy
+
+    def _glide(
+        self, body: pymunk.Body, gravity: object, damping: float, dt: float
+    ) -> None:
+        """Advance the velocity of a puck as in free flight; its spin stays."""
+        v = body.velocity
+        _, _, vx, vy = fly(v.x, v.y, dt, *self._pull, *self._drag)
+        body.velocity = vx, vy
+
+    def read(self, rows: Array, paddle_velocity: Array) -> None:
         """Fill ``rows`` (movers, 4) with x, y, vx, vy of every body."""
-        pucks = self.scene.bodies.puck
         for i, body in enumerate(self.bodies.all):
             rows[i, :2], rows[i, 2:] = body.position, body.velocity
-        rows[pucks, 2] += self.leapfrog_offset
+        rows[: len(paddle_velocity), 2:] = paddle_velocity
         for k, place in self._out.items():
-            rows[pucks.start + k] = (*place, 0.0, 0.0)
+            rows[self.scene.bodies.puck.start + k] = (*place, 0.0, 0.0)
 
     def read_angles(self, angle: Array, spin: Array) -> None:
-        """Fill angle (N,), rad, and spin (N,), rad/s, of the blocks."""
-        for i in range(self.scene.bodies.block.start, self.scene.bodies.block.stop):
+        """Fill angle (N,), rad, and spin (N,), rad/s, of pucks and blocks."""
+        bodies = self.scene.bodies
+        for i in range(bodies.puck.start, bodies.block.stop):
             body = self.bodies.all[i]
             angle[i], spin[i] = body.angle, body.angular_velocity
+        for k in self._out:
+            spin[bodies.puck.start + k] = 0.0
 
     def close_goals(self, closed: Array) -> None:
         """Close the goal lines that ``closed`` (M,) marks and open the others."""
@@ -195,6 +249,7 @@ class Space:
         """Clear the events of the last step."""
         self.touched[:], self.touched_at[:] = 0, np.nan
         self.banked[:], self.crossed[:], self.crossed_velocity[:] = 0, False, 0.0
+        self.lifted[:] = False
         for k in self._out:
             self._park(k)
         self._contact = bool(self._out) or bool(self.touching.any())
@@ -212,7 +267,7 @@ class Space:
         if self.touching[pair]:
             return
         self.touched[pair] += 1
-        self.touched_at[pair] = (self._substep + 1) * self.dt
+        self.touched_at[pair] = self._elapsed
         self.touching[pair] = True
 
     def _part(self, arbiter: pymunk.Arbiter, *_: object) -> None:
@@ -225,8 +280,8 @@ class Space:
             return
         self._contact = True
         body = self.bodies.all[self.scene.bodies.puck.start + k]
-        velocity = body.velocity.x + self.leapfrog_offset, body.velocity.y
-        self.crossed[k, index], self.crossed_velocity[k, index] = True, velocity
+        self.crossed[k, index] = True
+        self.crossed_velocity[k, index] = body.velocity
         if self.scene.goal_lines[index].width is not None:
             self._out[k] = tuple(body.position)
 
@@ -244,10 +299,44 @@ class Space:
         self.banked[k, side] += 1
         return True
 
-    def _soften(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Set the lower of both restitutions; Chipmunk's product is for pucks only."""
-        a, b = arbiter.shapes
-        arbiter.restitution = min(a.elasticity, b.elasticity)
+    def _hit(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Set the laws of a puck at a paddle."""
+        arbiter.restitution = self._values["paddle_restitution"]
+        arbiter.friction = self._values["paddle_friction"]
+
+    def _meet(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Set the laws of two pucks."""
+        arbiter.restitution = self._values["puck_restitution"]
+        arbiter.friction = self._values["puck_friction"]
+
+    def _bounce(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Set the laws of a puck at a wall, which depend on its normal speed."""
+        puck, _wall = self._ordered(arbiter, PUCK)
+        assert puck.body is not None
+        speed = abs(puck.body.velocity.dot(arbiter.normal))
+        arbiter.restitution = wall_restitution(
+            speed,
+            self._values["wall_restitution"],
+            self._values["wall_restitution_slope"],
+        )
+        arbiter.friction = self._values["wall_friction"]
+
+    def _shove(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Set the laws of a block, which returns no more than what it meets."""
+        block, other = self._ordered(arbiter, BLOCK)
+        arbiter.restitution = self._values["block_restitution"]
+        arbiter.friction = 0.0
+        if other.collision_type == PUCK:
+            arbiter.friction = self._values["puck_friction"]
+        elif other.collision_type in (WALL, GOAL_LINE):
+            assert block.body is not None
+            speed = abs(block.body.velocity.dot(arbiter.normal))
+            wall = wall_restitution(
+                speed,
+                self._values["wall_restitution"],
+                self._values["wall_restitution_slope"],
+            )
+            arbiter.restitution = min(arbiter.restitution, wall)
 
     @staticmethod
     def _ordered(
@@ -261,29 +350,52 @@ class Space:
         a, b = self._ordered(arbiter, kind)
         return self.bodies.index[a], self.bodies.index[b]
 
-    def _settle(self) -> None:
-        """Correct pucks after a contact: out of walls, below the cap, parked if out."""
-        bodies, table, offset = (
-            self.scene.bodies,
-            self.scene.table,
-            self.leapfrog_offset,
-        )
-        radius = table.puck_radius
-        for k, puck in enumerate(self.bodies.all[bodies.puck]):
-            if k in self._out:
+    def _settle(
+        self, position: Array, velocity: Array, imposed: Array, raised: Array
+    ) -> None:
+        """Correct bodies after a contact: below the cap, apart, parked if out.
+
+        Paddles that could not make a puck give way stop: their rows change.
+        """
+        paddles = len(position)
+        pucks = self.bodies.all[self.scene.bodies.puck]
+        for k in self._out:
+            self._park(k)
+        self._keep_below_the_cap()
+        places = np.array([*position, *(puck.position for puck in pucks)])
+        absent = np.zeros(len(places), np.bool_)
+        absent[:paddles] = raised
+        absent[[paddles + k for k in self._out]] = True
+        before = places.copy()
+        what = self._radius, paddles, imposed, absent, self._sides
+        if not give_way(places, velocity, *what):
+            return
+        position[:] = places[:paddles]
+        for i in np.flatnonzero((places != before).any(-1)).tolist():
+            body = self.bodies.all[i]
+            body.position = float(places[i, 0]), float(places[i, 1])
+            self.space.reindex_shapes_for_body(body)
+
+    def _keep_below_the_cap(self) -> None:
+        for puck in self.bodies.all[self.scene.bodies.puck]:
+            share = cap(puck.velocity.x, puck.velocity.y)
+            if share < 1.0:
+                puck.velocity = puck.velocity * share
+
+    def _lift_pinned(self, position: Array, imposed: Array, raised: Array) -> None:
+        """Lift the pucks that prescribed paddles have left no room for some time."""
+        table = self.scene.table
+        touch = table.paddle_radius + table.puck_radius - 1e-3
+        for k, puck in enumerate(self.bodies.all[self.scene.bodies.puck]):
+            if k in self._out or not imposed.any():
+                self._pinned[k] = 0.0
+                continue
+            gap = np.hypot(*(position - np.array(puck.position)).T)
+            held = bool((imposed & ~raised & (gap < touch)).any())
+            self._pinned[k] = self._pinned[k] + self.control_dt if held else 0.0
+            if self._pinned[k] > PATIENCE - 1e-9:
+                self.lifted[k], self._out[k] = True, (puck.position.x, puck.position.y)
                 self._park(k)
-                continue
-            vx, vy = puck.velocity.x + offset, puck.velocity.y
-            square = vx * vx + vy * vy
-            if square > PUCK_SPEED_CAP**2:
-                share = PUCK_SPEED_CAP / square**0.5
-                puck.velocity = vx * share - offset, vy * share
-            x, y = puck.position
-            if wall(self._sides, radius, x, y, SQUEEZE) < 0:
-                continue
-            paddles = np.array([p.position for p in self.bodies.all[bodies.paddle]])
-            touch = radius + table.paddle_radius
-            puck.position = slide_out(self._sides, radius, x, y, paddles, touch)
 
     def _park(self, k: int) -> None:
         body = self.bodies.all[self.scene.bodies.puck.start + k]

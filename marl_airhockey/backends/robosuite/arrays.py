@@ -47,7 +47,7 @@ class SimulationViews(NamedTuple):
     movers: Array
     """Indices of x of pucks and blocks in qpos and in qvel (movers, 2)"""
     coefficients: Array
-    """Coefficients of pucks and blocks (movers, 3): `TablePhysics.coefficients`"""
+    """Coefficients of pucks and blocks (movers, 5): `TablePhysics.coefficients`"""
     gravity: Array
     """Gravity (3,), m/s2"""
     gains: Array
@@ -99,6 +99,8 @@ class StepOutput(NamedTuple):
     """True if a puck touches the rail of a side (pucks, sides); persists"""
     crossed: Array
     crossed_velocity: Array
+    lifted: Array
+    """Never true: arms do not lift pucks (pucks,)"""
     beyond: Array
     """True if a puck is at or past a goal line (pucks, goal_lines); persists"""
     path: Array
@@ -179,6 +181,7 @@ def make_output(scene: Scene, path: tuple[int, ...], trace: Array) -> StepOutput
         against=np.zeros(banks, np.bool_),
         crossed=np.zeros(crossings, np.bool_),
         crossed_velocity=np.zeros((*crossings, 2)),
+        lifted=np.zeros(scene.pucks, np.bool_),
         beyond=np.zeros(crossings, np.bool_),
         path=np.zeros(path),
         trace=trace,

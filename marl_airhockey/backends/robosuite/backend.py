@@ -43,7 +43,7 @@ class RobosuiteBackend(Backend):
 
     exact: ClassVar[bool] = True
     ideal: ClassVar[bool] = False
-    default_substeps: ClassVar[int] = 50
+    timestep: ClassVar[float | None] = 0.001
     cameras: ClassVar[tuple[str, ...]] = ("frontview", "agentview", "birdview")
 
     @classmethod
@@ -75,9 +75,14 @@ class RobosuiteBackend(Backend):
         return None
 
     def __init__(
-        self, scene: Scene, num_worlds: int, control_dt: float, substeps: int
+        self,
+        scene: Scene,
+        num_worlds: int,
+        control_dt: float,
+        substeps: int | None = None,
     ) -> None:
         super().__init__(scene, num_worlds, control_dt, substeps)
+        substeps = self.substeps
         if control_dt / substeps > MAX_TIMESTEP:
             least = math.ceil(control_dt / MAX_TIMESTEP - 1e-9)
             raise ValueError(
@@ -165,9 +170,9 @@ class RobosuiteBackend(Backend):
         """Return final velocities (B, seats, 2), m/s; prescribed ones at top speed."""
         goal = np.zeros(command.velocity.shape)
         seats = goal.shape[:2]
-        imposed, lifted = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
-        motion = command.velocity, command.prescribed, before.position
-        follow(*motion, self.control_dt, goal, imposed, lifted)
+        imposed, raised = np.zeros(seats, np.bool_), np.zeros(seats, np.bool_)
+        ways = *command[:2], command.raised, before.position
+        follow(*ways, self.control_dt, goal, imposed, raised)
         top = np.array([seat.speed for seat in self.scene.seats])[:, None]
         size = np.hypot(goal[..., 0], goal[..., 1])[..., None]
         slow = np.minimum(1.0, top / np.maximum(size, 1e-9))

@@ -52,10 +52,10 @@ class TableFrame:
         """Transform a point from the table frame to the world (3,), m."""
         return np.asarray(self.origin + self.rotation @ (x, y, z))
 
-    def gravity(self, tilt: float, strength: float) -> Array:
-        """Return the gravity (3,), m/s2, that emulates another tilt of this table."""
-        more = np.radians(tilt - self.tilt)
-        return -strength * np.array([np.sin(more), 0.0, np.cos(more)])
+    def gravity(self, tilt: float, cross_tilt: float, strength: float) -> Array:
+        """Return the gravity (3,), m/s2, that emulates other tilts of this table."""
+        more, aside = np.radians(tilt - self.tilt), np.radians(cross_tilt)
+        return -strength * np.array([np.sin(more), np.sin(aside), np.cos(more)])
 
     def base(self, scene: Scene, seat: int) -> tuple[Array, float]:
         """Return position (3,), m, and heading about z, rad, of a seat's arm base."""

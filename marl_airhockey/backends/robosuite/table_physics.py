@@ -16,6 +16,9 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
+ABSENT = ("wall_restitution_slope", "wall_friction", "paddle_friction", "puck_friction")
+"""Parameters of laws that contacts here do not have."""
+
 
 class TablePhysics:
     """Physics of the pucks and blocks in one MuJoCo model.
@@ -48,15 +51,29 @@ class TablePhysics:
         ]
         for k in (*self._paddles, *self._feet):
             model.geom_size[k, 0] = scene.table.paddle_radius
-        self.coefficients = np.zeros((len(names), 3))
-        """Mass (kg), Coulomb friction (m/s2) and pull along x (m/s2) (movers, 3)."""
+        self.coefficients = np.zeros((len(names), 5))
+        """Mass (kg), Coulomb friction (m/s2), pull along x and y (m/s2) and quadratic
+        drag (1/m) (movers, 5)."""
         defaults = {name: p.default for name, p in PARAMETERS.items()}
         self.set_physics({**defaults, **scene.defaults})
 
     def set_physics(self, values: dict[str, float]) -> None:
-        """Set the physical parameters of the table."""
+        """Set the physical parameters of the table.
+
+        Raises:
+            ValueError: friction or a restitution that depends on speed.
+        """
+        for name in ABSENT:
+            if values[name] != 0.0:
+                raise ValueError(
+                    f"physics[{name!r}]: contacts of backend 'robosuite' have no "
+                    "friction, and a restitution of their own at every speed; set it "
+                    "to 0 there, or take the preset 'frictionless'"
+                )
         model, pucks = self._model, self.scene.pucks
-        model.opt.gravity[:] = self.frame.gravity(values["tilt"], GRAVITY)
+        model.opt.gravity[:] = self.frame.gravity(
+            values["tilt"], values["cross_tilt"], GRAVITY
+        )
         dt = model.opt.timestep
         for geoms, name in (
             (self._walls, "wall_restitution"),
@@ -64,12 +81,14 @@ class TablePhysics:
             (self._sides[pucks:], "block_restitution"),
         ):
             model.geom_solref[geoms] = solref(values[name], dt)
-        model.geom_solref[self._sides[:pucks]] = solref(1.0, dt)
+        model.geom_solref[self._sides[:pucks]] = solref(values["puck_restitution"], dt)
         coefficients = self.coefficients
         coefficients[:pucks, 0] = values["puck_mass"]
         coefficients[pucks:, 0] = values["block_mass"]
         coefficients[pucks:, 1] = values["block_friction"]
         coefficients[:, 2] = -GRAVITY * np.sin(np.radians(values["tilt"]))
+        coefficients[:, 3] = -GRAVITY * np.sin(np.radians(values["cross_tilt"]))
+        coefficients[:pucks, 4] = values["puck_drag"]
         for body, dof, mass in zip(
             self._bodies, self.dofs, coefficients[:, 0], strict=True
         ):
@@ -106,14 +125,14 @@ def apply_friction(
     forces: Array,
     dt: float,
 ) -> None:
-    """Apply Coulomb friction to blocks, as a force, and cap the speed of pucks.
+    """Apply drag to pucks and friction to blocks, and cap the speed of pucks.
 
     Args:
-        coefficients: (movers, 3) of `TablePhysics`.
+        coefficients: (movers, 5) of `TablePhysics`.
         dofs: indices of x in ``speeds`` (movers,).
         pucks: number of pucks, which are the first movers.
         speeds: (nv,) m/s, changed where a puck is too fast.
-        forces: (nv,) N, filled for blocks.
+        forces: (nv,) N, filled for pucks and blocks.
         dt: length of a physics step, s.
     """
     for i in range(len(dofs)):
@@ -123,9 +142,12 @@ def apply_friction(
             if size > PUCK_SPEED_CAP:
                 speeds[k] *= PUCK_SPEED_CAP / size
                 speeds[k + 1] *= PUCK_SPEED_CAP / size
+            push = -coefficients[i, 0] * coefficients[i, 4] * size
+            forces[k], forces[k + 1] = push * speeds[k], push * speeds[k + 1]
             continue
         # Velocity without friction, which removes at most all of it.
-        vx, vy = speeds[k] + coefficients[i, 2] * dt, speeds[k + 1]
+        vx = speeds[k] + coefficients[i, 2] * dt
+        vy = speeds[k + 1] + coefficients[i, 3] * dt
         size = np.hypot(vx, vy)
         if size > 0.0:
             push = -coefficients[i, 0] * min(coefficients[i, 1], size / dt) / size

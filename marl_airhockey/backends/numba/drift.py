@@ -1,0 +1,371 @@
+"""Drift: motion of one world up to the first touch on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.backends.numba.arrays import (
+    BLOCK_GRIP,
+    DAMPING,
+    DRAG,
+    NORMAL_X,
+    NORMAL_Y,
+    OFFSET,
+    PULL,
+    PULL_X,
+    PULL_Y,
+)
+from marl_airhockey.backends.numba.geometry import (
+    RELEASE,
+    ahead_of_mouth,
+    distance_to_fixed,
+    in_contact,
+)
+from marl_airhockey.backends.numba.impacts import (
+    ANGLE,
+    AWAY,
+    BEND,
+    CX,
+    CY,
+    DX,
+    DY,
+    EARLY_X,
+    EARLY_Y,
+    EX,
+    EY,
+    FALL,
+    FRICTION,
+    GX,
+    GY,
+    LATE_X,
+    LATE_Y,
+    MASS,
+    NX,
+    NY,
+    PINNED,
+    PRESCRIBED,
+    PUCK,
+    RADIUS,
+    REACH,
+    RESTITUTION,
+    SPIN,
+    TINY,
+    VX,
+    VY,
+    X,
+    Y,
+    closing,
+    distance_between,
+    meets,
+    solve,
+)
+from marl_airhockey.core.laws import fly, slide
+from marl_airhockey.types import Array
+
+BOW = 3e-4
+"""Distance of a curved way from its chord that a drift may have (m)."""
+REFINEMENTS = 5
+"""Number of times that the first touch is looked for, each on a shorter chord."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def list_near(
+    m: Array,
+    role: Array,
+    row: Array,
+    walls: Array,
+    obstacles: Array,
+    sides: int,
+    edges: int,
+    left: float,
+    near: Array,
+) -> int:
+    """List the pairs that can meet in what is left of the step.
+
+    A ramp is a parabola, which lies between its control points. Drag of any form keeps
+    a puck on v F + g H, where 0 <= F <= T and 0 <= H <= T2 / 2. So a body comes no
+    nearer to an object than the nearest of these points, projected on the line to the
+    object at first, less the distance of its fall.
+
+    Args:
+        m: bodies (N, BODY); `REACH` and `BEND` are filled.
+        role: roles (N,).
+        row: coefficients of the world.
+        walls: walls.
+        obstacles: obstacles.
+        sides: number of walls that hold pucks; those of paddles follow.
+        edges: number of walls that hold each paddle.
+        left: s.
+        near: bodies of each pair (size, 2), filled; fixed object f is -1 - f.
+
+    Returns:
+        The number of pairs.
+    """
+    pull = row[PULL]
+    for i in range(len(m)):
+        vx, vy, half = m[i, VX], m[i, VY], 0.5 * left
+        speed = vx * vx + vy * vy
+        if m[i, MASS] == 0.0:
+            gx, gy = m[i, GX], m[i, GY]
+            m[i, EARLY_X], m[i, EARLY_Y] = half * vx, half * vy
+            m[i, LATE_X], m[i, LATE_Y] = half * (vx + gx), half * (vy + gy)
+            bend = (gx - vx) ** 2 + (gy - vy) ** 2
+            m[i, BEND] = np.sqrt(bend) / max(left, 1e-12)
+            m[i, REACH] = np.sqrt(max(speed, gx * gx + gy * gy))
+            m[i, FALL] = 0.0
+        else:
+            m[i, EARLY_X] = m[i, LATE_X] = left * vx
+            m[i, EARLY_Y] = m[i, LATE_Y] = left * vy
+            m[i, BEND] = pull
+            m[i, REACH] = np.sqrt(speed) + pull * left
+            m[i, FALL] = pull * half * left
+    count, fixed = 0, len(walls) + len(obstacles)
+    for j in range(len(m)):
+        for i in range(-fixed, j):
+            if not meets(role, i, j, len(walls), sides, edges):
+                continue
+            gap, nx, ny = distance_between(m, i, j, walls, obstacles)
+            early = nx * m[j, EARLY_X] + ny * m[j, EARLY_Y]
+            gap += min(early, nx * m[j, LATE_X] + ny * m[j, LATE_Y], 0.0) - m[j, FALL]
+            if i >= 0:
+                early = nx * m[i, EARLY_X] + ny * m[i, EARLY_Y]
+                late = nx * m[i, LATE_X] + ny * m[i, LATE_Y]
+                gap -= max(early, late, 0.0) + m[i, FALL]
+            if gap < RELEASE:
+                near[count, 0], near[count, 1] = i, j
+                count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _list_near_drift(
+    m: Array,
+    role: Array,
+    walls: Array,
+    obstacles: Array,
+    sides: int,
+    edges: int,
+    h: float,
+    near: Array,
+) -> int:
+    """List the pairs that can meet in h s at the mean velocities of a drift."""
+    count, fixed = 0, len(walls) + len(obstacles)
+    for j in range(len(m)):
+        for i in range(-fixed, j):
+            if meets(role, i, j, len(walls), sides, edges):
+                gap, nx, ny = distance_between(m, i, j, walls, obstacles)
+                if gap + closing(m, DX, i, j, nx, ny) * h < RELEASE:
+                    near[count, 0], near[count, 1] = i, j
+                    count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def longest_drift(m: Array, role: Array, near: Array, count: int) -> float:
+    """Return the longest drift whose chords are true to `BOW`, s."""
+    bend = 0.0
+    for k in range(count):
+        i, j = near[k, 0], near[k, 1]
+        # A ramp that ends within a reach lies in it, and so do its chords.
+        if i >= 0:
+            bend = max(bend, m[i, BEND] + m[j, BEND])
+        elif role[j] > PRESCRIBED:
+            bend = max(bend, m[j, BEND])
+    return float(np.sqrt(8.0 * BOW / bend)) if bend > 0.0 else np.inf
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def drift(
+    m: Array,
+    role: Array,
+    row: Array,
+    walls: Array,
+    obstacles: Array,
+    sides: int,
+    edges: int,
+    goal_lines: Array,
+    near: Array,
+    count: int,
+    pairs: Array,
+    contacts: Array,
+    visits: Array,
+    kept: Array,
+    n: int,
+    left: float,
+    h: float,
+    safe: float,
+    sweeps: bool,
+) -> tuple[float, bool]:
+    """Move all bodies by at most h s, until something begins to touch.
+
+    What is in contact does not close: that is solved for the mean velocities.
+
+    Args:
+        m: bodies (N, BODY), moved.
+        role: roles (N,).
+        row: coefficients of the world.
+        walls: walls.
+        obstacles: obstacles.
+        sides: see `list_near`.
+        edges: see `list_near`.
+        goal_lines: see `Static`.
+        near: pairs that can meet (count or more, 2).
+        count: their number.
+        pairs: bodies in contact (n or more, 2).
+        contacts: their contacts.
+        visits: work space.
+        kept: work space.
+        n: number of contacts.
+        left: s of the step.
+        h: s.
+        safe: s in which nothing begins to touch.
+        sweeps: whether to end at the first touch.
+
+    Returns:
+        The length of the drift, s, and True if ``near`` must be listed again.
+    """
+    stale = False
+    for attempt in range(REFINEMENTS):
+        _move_freely(m, role, row, left, h)
+        hits = False
+        for c in range(n):
+            i, j = pairs[c, 0], pairs[c, 1]
+            speed = closing(m, DX, i, j, contacts[c, NX], contacts[c, NY])
+            hits |= speed < -TINY and role[j] != PINNED
+        if hits:
+            for c in range(n):
+                contacts[c, RESTITUTION] = contacts[c, FRICTION] = 0.0
+            solve(m, role, DX, pairs, contacts, visits, kept, n)
+            stale, safe = True, 0.0
+            longest = _longest_slide(m, pairs, contacts, n)
+            if longest < h and attempt < REFINEMENTS - 1:
+                h = longest
+                continue
+            count = _list_near_drift(
+                *(m, role, walls, obstacles, sides, edges, h, near)
+            )
+        if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
+            break
+        share = _first_touch(m, role, walls, obstacles, goal_lines, near, count, h)
+        if share >= 1.0:
+            break
+        h = max(h * share, 1e-9)
+    for i in range(len(m)):
+        if role[i] == PINNED:
+            continue
+        m[i, X] += m[i, DX] * h
+        m[i, Y] += m[i, DY] * h
+        # The mean of a constant acceleration: what a contact took from the mean, it
+        # took twice from the end.
+        m[i, VX] = m[i, EX] + 2.0 * (m[i, DX] - m[i, CX])
+        m[i, VY] = m[i, EY] + 2.0 * (m[i, DY] - m[i, CY])
+        m[i, ANGLE] += m[i, SPIN] * h
+    return h, stale
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _longest_slide(m: Array, pairs: Array, contacts: Array, n: int) -> float:
+    """Return the longest drift in which discs that slide on each other part by `BOW`.
+
+    They part as a tangent does from its circle.
+    """
+    longest = np.inf
+    for c in range(n):
+        i, j = pairs[c, 0], pairs[c, 1]
+        if i >= 0:
+            tx, ty = -contacts[c, NY], contacts[c, NX]
+            speed = abs(closing(m, DX, i, j, tx, ty))
+            room = np.sqrt(2.0 * BOW * (m[i, RADIUS] + m[j, RADIUS]))
+            longest = min(longest, room / max(speed, 1e-9))
+    return float(longest)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> None:
+    """Fill the mean and last velocities of a drift without contacts."""
+    for i in range(len(m)):
+        vx, vy = m[i, VX], m[i, VY]
+        if m[i, MASS] == 0.0:
+            share = h / left
+            m[i, EX] = vx + (m[i, GX] - vx) * share
+            m[i, EY] = vy + (m[i, GY] - vy) * share
+            m[i, CX], m[i, CY] = 0.5 * (vx + m[i, EX]), 0.5 * (vy + m[i, EY])
+        elif role[i] >= AWAY:
+            m[i, EX] = m[i, EY] = m[i, CX] = m[i, CY] = 0.0
+        else:
+            gx, gy = row[PULL_X], row[PULL_Y]
+            if role[i] == PUCK:
+                x, y, ex, ey = fly(vx, vy, h, gx, gy, row[DAMPING], row[DRAG])
+            else:
+                x, y, ex, ey = slide(vx, vy, h, gx, gy, row[BLOCK_GRIP])
+            m[i, EX], m[i, EY], m[i, CX], m[i, CY] = ex, ey, x / h, y / h
+        m[i, DX], m[i, DY] = m[i, CX], m[i, CY]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def _first_touch(
+    m: Array,
+    role: Array,
+    walls: Array,
+    obstacles: Array,
+    goal_lines: Array,
+    near: Array,
+    count: int,
+    h: float,
+) -> float:
+    """Return the share of h s until two bodies touch or a puck crosses a goal line."""
+    first = 1.0
+    for k in range(count):
+        i, j = near[k, 0], near[k, 1]
+        if role[j] >= AWAY or (i >= 0 and role[i] >= AWAY):
+            continue
+        gap, nx, ny = distance_between(m, i, j, walls, obstacles)
+        way = closing(m, DX, i, j, nx, ny) * h
+        # Distances to convex objects are convex: they fall no faster than at first.
+        if gap + way * first >= 0.0 or in_contact(gap, way / h):
+            continue
+        if i < 0:
+            first = min(first, _touch_fixed(m, j, -1 - i, walls, obstacles, h, first))
+            continue
+        x, y = (m[j, DX] - m[i, DX]) * h, (m[j, DY] - m[i, DY]) * h
+        touch = m[i, RADIUS] + m[j, RADIUS]
+        along, between = (gap + touch) * way, gap * (gap + 2.0 * touch)
+        root = along * along - (x * x + y * y) * between
+        if root > 0.0:
+            first = min(first, between / (np.sqrt(root) - along))
+    for g in range(len(goal_lines)):
+        f = goal_lines[g, 1]
+        for i in range(len(m)):
+            if f < 0 or role[i] != PUCK:
+                continue
+            x, y, nx, ny = m[i, X], m[i, Y], walls[f, NORMAL_X], walls[f, NORMAL_Y]
+            way = (nx * m[i, DX] + ny * m[i, DY]) * h
+            ahead = nx * x + ny * y + walls[f, OFFSET]
+            if way < 0.0 < ahead < -way * first:
+                share = ahead / -way
+                x, y = x + m[i, DX] * h * share, y + m[i, DY] * h * share
+                if ahead_of_mouth(x, y, walls, f) < np.inf:
+                    first = share
+    return first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _touch_fixed(
+    m: Array, j: int, f: int, walls: Array, obstacles: Array, h: float, most: float
+) -> float:
+    """Return the share of h s until body j touches a fixed object.
+
+    It is ``most`` or more where it does not. By Newton's method, whose steps never
+    pass the first zero of a convex function.
+    """
+    share, x, y = 0.0, m[j, DX] * h, m[j, DY] * h
+    for _ in range(12):
+        px, py = m[j, X] + share * x, m[j, Y] + share * y
+        gap, nx, ny = distance_to_fixed(px, py, f, walls, obstacles)
+        gap -= m[j, RADIUS]
+        slope = nx * x + ny * y
+        if gap < 1e-9 or slope >= 0.0 or share >= most:
+            return share if gap < 1e-9 else 1.0
+        share -= gap / slope
+    return share
