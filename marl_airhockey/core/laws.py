@@ -35,12 +35,25 @@ def fly(
         damping: linear drag, 1/s.
         drag: quadratic drag, 1/m.
     """
+    time = -np.expm1(-damping * h) / damping if damping > 0.0 else h
+    return fly_slowed(vx, vy, h, time, gx, gy, damping, drag)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def fly_slowed(
+    vx: float,
+    vy: float,
+    h: float,
+    time: float,
+    gx: float,
+    gy: float,
+    damping: float,
+    drag: float,
+) -> Motion:
+    """Return what `fly` does, given (1 - exp(-damping h)) / damping as ``time``, s."""
     ux, uy = vx + 0.5 * gx * h, vy + 0.5 * gy * h
     left, way = 1.0, h
     if drag > 0.0 or damping > 0.0:
-        time = h
-        if damping > 0.0:
-            time = -np.expm1(-damping * h) / damping
         z = drag * time * np.sqrt(ux * ux + uy * uy)
         if z < 0.02:
             # ln(1 + z) / z by its series, which is as exact and faster.

@@ -13,15 +13,16 @@ from marl_airhockey.types import Array
 
 PULL_X, PULL_Y, DAMPING, DRAG = range(4)
 WALL, WALL_SLOPE, WALL_MU, PADDLE, PADDLE_MU, PUCK, PUCK_MU, BLOCK = range(4, 12)
-PUCK_MASS, BLOCK_MASS, BLOCK_GRIP, PULL = range(12, 16)
-COEFFICIENTS = 16
+PUCK_MASS, BLOCK_MASS, BLOCK_GRIP, PULL, STEP_TIME = range(12, 17)
+COEFFICIENTS = 17
 """Columns of a world's coefficients: acceleration by the slope (m/s2), linear (1/s) and
 quadratic drag (1/m); restitution at walls, its loss per ln(m/s), and friction there;
 restitutions and frictions of paddles and pucks, restitution of blocks; masses (kg),
-deceleration of sliding blocks, and the size of the slope's acceleration (m/s2)."""
+deceleration of sliding blocks, the size of the slope's acceleration (m/s2), and the
+time without linear drag for the way that a puck goes in a control step with it (s)."""
 
 
-def make_coefficients(values: dict[str, Array]) -> Array:
+def make_coefficients(values: dict[str, Array], control_dt: float) -> Array:
     """Return (B, COEFFICIENTS) from physical parameters (B,)."""
     names = (
         *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
@@ -31,7 +32,11 @@ def make_coefficients(values: dict[str, Array]) -> Array:
     )
     pull_x = -GRAVITY * np.sin(np.radians(values["tilt"]))
     pull_y = -GRAVITY * np.sin(np.radians(values["cross_tilt"]))
-    columns = [pull_x, pull_y, *(values[n] for n in names), np.hypot(pull_x, pull_y)]
+    damping = values["puck_damping"]
+    time = -np.expm1(-damping * control_dt) / np.maximum(damping, 1e-300)
+    time = np.where(damping > 0.0, time, control_dt)
+    columns = [pull_x, pull_y, *(values[n] for n in names)]
+    columns += [np.hypot(pull_x, pull_y), time]
     return np.stack(columns, axis=-1)
 
 
@@ -44,16 +49,20 @@ the middle, times ``SIGN``, is at least ``HALF`` (m; -inf for all of the line)."
 def make_walls(scene: Scene) -> tuple[Array, Array, Array, int]:
     """Return the walls of a scene: one per side, or two beside an open goal line.
 
-    The edges of the seats' reaches follow, E of each seat, which hold its paddle alone.
+    The edges of the seats' reaches come first, E of each seat, which hold its paddle
+    alone.
 
     Returns:
-        Walls (F + S E, 7), the sides of the first ones (F,), for each goal line (M, 2)
-        its side and the first of its two walls, -1 where the line is a whole side, and
-        E.
+        Walls (S E + F, 7), the sides that they belong to (S E + F,), -1 for edges, for
+        each goal line (M, 2) its side and the first of its two walls, -1 where the line
+        is a whole side, and E.
     """
     table = scene.table
+    normals, offsets = reaches(table, scene.seats)
     rows: list[list[float]] = []
-    owner: list[int] = []
+    for normal, offset in zip(normals.reshape(-1, 2), offsets.ravel(), strict=True):
+        rows.append([*normal, offset + table.paddle_radius, 0.0, 0.0, 1.0, -np.inf])
+    owner = [-1] * len(rows)
     lines = np.full((len(scene.goal_lines), 2), -1, np.int64)
     for side in range(len(table.vertices)):
         start, end = table.ends(side)
@@ -66,9 +75,6 @@ def make_walls(scene: Scene) -> tuple[Array, Array, Array, int]:
         for part in ends or [(1.0, -np.inf)]:
             rows.append([*line, *part])
             owner.append(side)
-    normals, offsets = reaches(table, scene.seats)
-    for normal, offset in zip(normals.reshape(-1, 2), offsets.ravel(), strict=True):
-        rows.append([*normal, offset + table.paddle_radius, 0.0, 0.0, 1.0, -np.inf])
     return np.array(rows), np.array(owner), lines, normals.shape[1]
 
 
@@ -81,7 +87,7 @@ class Static(NamedTuple):
     radius: Array
     """Radii of the bodies (N,), m"""
     walls: Array
-    """Walls (F + S E, 7): see `make_walls`, like the next three"""
+    """Walls (S E + F, 7): see `make_walls`, like the next three"""
     wall_side: Array
     goal_lines: Array
     edges: int

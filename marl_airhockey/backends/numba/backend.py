@@ -45,7 +45,7 @@ class NumbaBackend(Backend):
         )
         seats, pucks = (b, bodies.paddles), (b, bodies.pucks)
         defaults = {name: np.full(b, p.default) for name, p in PARAMETERS.items()}
-        self._coefficients = make_coefficients(defaults)
+        self._coefficients = make_coefficients(defaults, control_dt)
         self._goal = np.zeros((*seats, 2))
         self._imposed = np.zeros(seats, np.bool_)
         self._raised = np.zeros(seats, np.bool_)
@@ -72,7 +72,7 @@ class NumbaBackend(Backend):
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         rows = {name: value[worlds] for name, value in values.items()}
-        self._coefficients[worlds] = make_coefficients(rows)
+        self._coefficients[worlds] = make_coefficients(rows, self.control_dt)
 
     def reset(self, state: State, worlds: Array) -> None:
         super().reset(state, worlds)

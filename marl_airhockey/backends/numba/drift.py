@@ -57,7 +57,7 @@ from marl_airhockey.backends.numba.impacts import (
     Y,
     closing,
     distance_between,
-    meets,
+    fixed_range,
     solve,
 )
 from marl_airhockey.core.laws import fly, slide
@@ -76,7 +76,7 @@ def list_near(
     row: Array,
     walls: Array,
     obstacles: Array,
-    sides: int,
+    held: int,
     edges: int,
     left: float,
     near: Array,
@@ -94,8 +94,8 @@ def list_near(
         row: coefficients of the world.
         walls: walls.
         obstacles: obstacles.
-        sides: number of walls that hold pucks; those of paddles follow.
-        edges: number of walls that hold each paddle.
+        held: see `fixed_range`, like the next.
+        edges: of each paddle's reach.
         left: s.
         near: bodies of each pair (size, 2), filled; fixed object f is -1 - f.
 
@@ -122,8 +122,12 @@ def list_near(
             m[i, FALL] = pull * half * left
     count, fixed = 0, len(walls) + len(obstacles)
     for j in range(len(m)):
-        for i in range(-fixed, j):
-            if not meets(role, i, j, len(walls), sides, edges):
+        low, high = fixed_range(role, j, held, edges, fixed)
+        for place in range(j + high - low if role[j] < AWAY else 0):
+            i = place if place < j else -1 - (low + place - j)
+            if i >= 0 and role[i] >= AWAY:
+                continue
+            if i >= 0 and role[i] == PRESCRIBED and role[j] == PRESCRIBED:
                 continue
             gap, nx, ny = distance_between(m, i, j, walls, obstacles)
             early = nx * m[j, EARLY_X] + ny * m[j, EARLY_Y]
@@ -144,7 +148,7 @@ def _list_near_drift(
     role: Array,
     walls: Array,
     obstacles: Array,
-    sides: int,
+    held: int,
     edges: int,
     h: float,
     near: Array,
@@ -152,8 +156,10 @@ def _list_near_drift(
     """List the pairs that can meet in h s at the mean velocities of a drift."""
     count, fixed = 0, len(walls) + len(obstacles)
     for j in range(len(m)):
-        for i in range(-fixed, j):
-            if meets(role, i, j, len(walls), sides, edges):
+        low, high = fixed_range(role, j, held, edges, fixed)
+        for place in range(j + high - low if role[j] < AWAY else 0):
+            i = place if place < j else -1 - (low + place - j)
+            if i < 0 or role[i] < AWAY:
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
                 if gap + closing(m, DX, i, j, nx, ny) * h < RELEASE:
                     near[count, 0], near[count, 1] = i, j
@@ -182,7 +188,7 @@ def drift(
     row: Array,
     walls: Array,
     obstacles: Array,
-    sides: int,
+    held: int,
     edges: int,
     goal_lines: Array,
     near: Array,
@@ -207,7 +213,7 @@ def drift(
         row: coefficients of the world.
         walls: walls.
         obstacles: obstacles.
-        sides: see `list_near`.
+        held: see `list_near`.
         edges: see `list_near`.
         goal_lines: see `Static`.
         near: pairs that can meet (count or more, 2).
@@ -242,9 +248,7 @@ def drift(
             if longest < h and attempt < REFINEMENTS - 1:
                 h = longest
                 continue
-            count = _list_near_drift(
-                *(m, role, walls, obstacles, sides, edges, h, near)
-            )
+            count = _list_near_drift(*(m, role, walls, obstacles, held, edges, h, near))
         if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
             break
         share = _first_touch(m, role, walls, obstacles, goal_lines, near, count, h)

@@ -12,10 +12,11 @@ from marl_airhockey.backends.numba.arrays import (
     PULL,
     PULL_X,
     PULL_Y,
+    STEP_TIME,
     Batch,
 )
 from marl_airhockey.backends.numba.geometry import RELEASE, distance_to_fixed
-from marl_airhockey.core.laws import cap, fly
+from marl_airhockey.core.laws import cap, fly_slowed
 from marl_airhockey.types import Array
 
 
@@ -85,7 +86,7 @@ def _may_touch(batch: Batch, b: int) -> bool:
             continue
         x, y = position[b, i, 0], position[b, i, 1]
         wx, wy = velocity[b, i, 0] * dt, velocity[b, i, 1] * dt
-        for f in range(len(static.wall_side)):
+        for f in range(paddles * static.edges, len(walls)):
             nx, ny = walls[f, 0], walls[f, 1]
             ahead = nx * x + ny * y + walls[f, 2]
             near |= ahead + min(nx * wx + ny * wy, 0.0) < radius[i] + drop
@@ -129,6 +130,7 @@ def _move(batch: Batch, b: int) -> None:
             result.velocity[b, i, axis] = end
     gx, gy = coefficients[b, PULL_X], coefficients[b, PULL_Y]
     damping, drag = coefficients[b, DAMPING], coefficients[b, DRAG]
+    time = coefficients[b, STEP_TIME]
     for k in range(pucks):
         i = paddles + k
         result.pinned[b, k] = 0.0
@@ -140,7 +142,9 @@ def _move(batch: Batch, b: int) -> None:
         if not result.out[b, k]:
             vx, vy, spin = velocity[b, i, 0], velocity[b, i, 1], previous.spin[b, i]
             share = cap(vx, vy)
-            x, y, vx, vy = fly(share * vx, share * vy, dt, gx, gy, damping, drag)
+            x, y, vx, vy = fly_slowed(
+                share * vx, share * vy, dt, time, gx, gy, damping, drag
+            )
             share = cap(vx, vy)
             vx, vy = share * vx, share * vy
         result.position[b, i, 0] = position[b, i, 0] + x

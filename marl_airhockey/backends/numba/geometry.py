@@ -113,13 +113,15 @@ def find_leaning(
         pucks: (B, pucks, 2) m.
         radius: of a puck, m.
         walls: see `make_walls`, like the next.
-        wall_side: (F,).
+        wall_side: of each wall, -1 for edges of reaches.
         against: (B, pucks, sides) bool, filled in these worlds.
     """
     for b in worlds:
         for k in range(pucks.shape[1]):
             against[b, k] = False
-            for f in range(len(wall_side)):
+            for f in range(len(walls)):
+                if wall_side[f] < 0:
+                    continue
                 x, y = pucks[b, k, 0], pucks[b, k, 1]
                 near = distance_to_wall(x, y, walls, f)[0] < radius + NEAR
                 against[b, k, wall_side[f]] |= near

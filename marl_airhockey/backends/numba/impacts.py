@@ -292,23 +292,26 @@ def _stop_paddles(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def meets(role: Array, i: int, j: int, walls: int, sides: int, edges: int) -> bool:
-    """Return True if body i, or fixed object -1 - i, can touch body j at all."""
-    if role[j] >= AWAY:
-        return False
-    if i >= 0:
-        both = role[i] == PRESCRIBED and role[j] == PRESCRIBED
-        return bool(role[i] < AWAY and not both)
-    f = -1 - i
+def fixed_range(
+    role: Array, j: int, held: int, edges: int, end: int
+) -> tuple[int, int]:
+    """Return the first fixed object that body j can touch, and the one after the last.
+
+    Args:
+        role: roles.
+        j: body.
+        held: number of walls that hold paddles, ``edges`` each, which come first.
+        edges: of each paddle's reach.
+        end: number of fixed objects.
+    """
     if role[j] > PRESCRIBED:
-        return f < sides or f >= walls
-    first = sides + j * edges
-    return bool(role[j] == ASKS and first <= f < first + edges)
+        return held, end
+    return (j * edges, (j + 1) * edges) if role[j] == ASKS else (0, 0)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def take_apart(
-    m: Array, role: Array, walls: Array, obstacles: Array, sides: int, edges: int
+    m: Array, role: Array, walls: Array, obstacles: Array, held: int, edges: int
 ) -> None:
     """Move overlapping bodies apart: pucks give way, then paddles that ask.
 
@@ -317,16 +320,18 @@ def take_apart(
         role: roles.
         walls: walls, of which the first hold pucks.
         obstacles: obstacles.
-        sides: number of walls that hold pucks; those of paddles follow.
-        edges: number of walls that hold each paddle.
+        held: see `fixed_range`, like the next.
+        edges: of each paddle's reach.
     """
     fixed = len(walls) + len(obstacles)
     for sweep in range(100):
         deepest = 0.0
         for j in range(len(m)):
             # Fixed objects last, which no body is left in.
-            for i in range(j - 1, -fixed - 1, -1):
-                if not meets(role, i, j, len(walls), sides, edges):
+            low, high = fixed_range(role, j, held, edges, fixed)
+            for place in range(j + high - low):
+                i = j - 1 - place if place < j else -1 - (low + place - j)
+                if role[j] >= AWAY or (i >= 0 and role[i] >= AWAY):
                     continue
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
                 deep = -gap - SLOP

@@ -173,7 +173,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
     static, coefficients, commands, previous, result = batch
     paddles, pucks, blocks, radius, shared, wall_side = static[:6]
     goal_lines, edges, obstacles, control_dt = static[6:]
-    sides = len(wall_side)
+    held = paddles * edges
     goal, prescribed, raised, closed = commands
     position, velocity, angle, spin = result[:4]
     touched, touched_at, touching, banked = result[5:9]
@@ -279,7 +279,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
         if gap > RELEASE and role[j] == PUCK:
             if 0 <= i < paddles:
                 touching[b, i, k] = False
-            elif i < 0 and -1 - i < sides and walls[-1 - i, HALF] == -np.inf:
+            elif i < 0 and -1 - i < len(walls) and walls[-1 - i, HALF] == -np.inf:
                 against[b, k, wall_side[-1 - i]] = False
 
     def meet(b: int, i: int, j: int, now: float) -> None:
@@ -292,7 +292,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                 touched[b, i, k] += 1
                 touched_at[b, i, k] = now
                 touching[b, i, k] = True
-        elif -1 - i < sides:
+        elif -1 - i < len(walls):
             side = wall_side[-1 - i]
             if not against[b, k, side]:
                 banked[b, k, side] += 1
@@ -355,7 +355,15 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
             rounds += 1
             if stale:
                 count = list_near(
-                    *(m, role, coefficients[b], walls, obstacles, sides, edges),
+                    *(
+                        m,
+                        role,
+                        coefficients[b],
+                        walls,
+                        obstacles,
+                        paddles * edges,
+                        edges,
+                    ),
                     *(left, near),
                 )
                 bend, stale = longest_drift(m, role, near, count), False
@@ -396,7 +404,16 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
             h = min(max(bend, safe), left, until)
             if rounds > 60:
                 h = min(max(h, control_dt / 50), left)
-            world = m, role, coefficients[b], walls, obstacles, sides, edges, goal_lines
+            world = (
+                m,
+                role,
+                coefficients[b],
+                walls,
+                obstacles,
+                paddles * edges,
+                edges,
+                goal_lines,
+            )
             met = pairs, contacts, visits, kept, n
             h, stale = drift(*world, near, count, *met, left, h, safe, rounds <= 60)
             left = left - h if left - h > 1e-12 else 0.0
@@ -408,7 +425,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                 )
                 deep |= gap < -SLOP
             if deep:
-                take_apart(m, role, walls, obstacles, sides, edges)
+                take_apart(m, role, walls, obstacles, held, edges)
                 stale = True
             if path.shape[1] > 0 and until - h < 1e-12:
                 if left > 0.0:
