@@ -135,23 +135,3 @@ def impulse(
     normal = (1.0 + restitution) * speed / normal_mass
     most = friction * normal
     return normal, min(max(-slip / tangential_mass, -most), most)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def bounce(
-    along: float, edge: float, speed: float, restitution: float, friction: float
-) -> tuple[float, float, float]:
-    """Return a puck's velocity and spin after a wall or a still paddle.
-
-    Args:
-        along: tangential velocity, along the normal turned by +90 degrees, m/s.
-        edge: radius times spin, counter-clockwise, m/s.
-        speed: closing speed, m/s, above 0.
-        restitution: share of it that is returned.
-        friction: coefficient.
-
-    Returns:
-        Tangential velocity, radius times spin and normal speed after it, m/s.
-    """
-    _, push = impulse(speed, along - edge, restitution, friction, 1.0, 3.0)
-    return along + push, edge - 2.0 * push, restitution * speed

@@ -43,6 +43,7 @@ def test_a_bounce_with_spin_sticks_or_slides(preset):
 def test_two_pucks_exchange_momentum_and_spin():
     rng = np.random.default_rng(1)
     bench = Bench("numba", PRESETS["professional"] | {"puck_drag": 0.0}, pucks=2)
+    hits = 0
     for _ in range(50):
         off = rng.uniform(-0.9, 0.9) * 2 * RADIUS
         speed, edge = rng.uniform(0.5, 5), rng.uniform(-2, 2, 2)
@@ -54,6 +55,7 @@ def test_two_pucks_exchange_momentum_and_spin():
             before, after = after, bench.backend.step(bench.command())
         if not after.puck_velocity[0, 1].any():
             continue
+        hits += 1
         momentum = before.puck_velocity.sum(1), after.puck_velocity.sum(1)
         np.testing.assert_allclose(*momentum, atol=1e-9)
         energy = [
@@ -61,6 +63,7 @@ def test_two_pucks_exchange_momentum_and_spin():
             for s in (before, after)
         ]
         assert energy[1] <= energy[0] + 1e-12
+    assert hits > 40
 
 
 @pytest.mark.parametrize("pull", [(0.0, 0.0), (-0.94, 0.0), (-0.6, 0.3)])

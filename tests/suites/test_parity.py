@@ -55,11 +55,12 @@ def table_with(**options):
     return Scene(TABLE, (make_seat("robot", TABLE, 0),), **{"pucks": 1} | options)
 
 
-def same_outcome(pymunk, numba, share=0.02, least=0.05):
-    """Velocities at the end within a share of the speeds, after at most one contact."""
+def same_outcome(pymunk, numba, share=0.02, least=0.05, most=1):
+    """Velocities at the end within a share of the speeds, after few contacts."""
     a, b = pymunk[-1], numba[-1]
     contacts = sum(s.touched.sum((1, 2)) + s.banked.sum((1, 2)) for s in numba)
-    few = contacts <= 1
+    few = contacts <= most
+    assert few.mean() > 0.5
     speed = np.linalg.norm(a.velocity, axis=-1).max(-1)
     error = np.linalg.norm(a.velocity - b.velocity, axis=-1).max(-1)
     assert (error <= share * np.maximum(speed, least))[few].all(), error[few].max()
@@ -116,7 +117,7 @@ def test_a_puck_and_a_paddle_at_all_angles_and_speeds(moving):
         command[:, 0] = polar(pace, rng.uniform(0, 2 * np.pi, worlds))
     pymunk, numba = play(table_with(), rows, 0.35, command)
     assert np.mean(np.any([s.touched.any((1, 2)) for s in pymunk], axis=0)) > 0.8
-    same_outcome(pymunk, numba)
+    same_outcome(pymunk, numba, most=3)
 
 
 def test_a_puck_strikes_a_block_head_on_and_glancing():
@@ -149,7 +150,8 @@ def test_a_puck_in_a_corner():
     angle, speed = rng.uniform(0.05, 1.52, worlds), rng.uniform(0.3, 4.0, worlds)
     start = np.array([0.75, 0.22]) + rng.uniform(-0.03, 0.03, (worlds, 2))
     rows = bodies(worlds, np.concatenate([start, polar(speed, angle)], -1))
-    same_outcome(*play(table_with(), rows, 0.3))
+    # Bounces off flat walls do not make an error grow.
+    same_outcome(*play(table_with(), rows, 0.3), most=4)
 
 
 def test_a_puck_at_a_goal_post_and_through_the_mouth():

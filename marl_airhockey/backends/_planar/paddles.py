@@ -141,3 +141,40 @@ def separate_paddles(
                 velocity[j, 0] += (common - vj) * nx
                 velocity[j, 1] += (common - vj) * ny
     return overlap
+
+
+@njit(cache=True)
+def keep_in_reach(
+    position: Array, velocity: Array, held: Array, normals: Array, offsets: Array
+) -> bool:
+    """Move paddles back to the edges of their reaches, where they stop.
+
+    Args:
+        position: (paddles, 2) m, changed in place.
+        velocity: (paddles, 2) m/s, changed in place.
+        held: (paddles,) bool: the reach counts.
+        normals: `core.seat.reaches` (paddles, K, 2), like the next.
+        offsets: (paddles, K) m.
+
+    Returns:
+        True if any paddle was outside.
+    """
+    moved = False
+    for i in range(len(held)):
+        for _ in range(100 if held[i] else 0):
+            outside = 0.0
+            for f in range(offsets.shape[1]):
+                nx, ny = normals[i, f, 0], normals[i, f, 1]
+                deep = -nx * position[i, 0] - ny * position[i, 1] - offsets[i, f]
+                if deep <= 1e-12:
+                    continue
+                outside = max(outside, deep)
+                position[i, 0] += deep * nx
+                position[i, 1] += deep * ny
+                out = min(nx * velocity[i, 0] + ny * velocity[i, 1], 0.0)
+                velocity[i, 0] -= out * nx
+                velocity[i, 1] -= out * ny
+            if outside == 0.0:
+                break
+            moved = True
+    return moved

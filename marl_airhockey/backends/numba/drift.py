@@ -58,6 +58,7 @@ from marl_airhockey.backends.numba.impacts import (
     closing,
     distance_between,
     fixed_range,
+    partner,
     solve,
 )
 from marl_airhockey.core.laws import fly, slide
@@ -122,9 +123,9 @@ def list_near(
             m[i, FALL] = pull * half * left
     count, fixed = 0, len(walls) + len(obstacles)
     for j in range(len(m)):
-        low, high = fixed_range(role, j, held, edges, fixed)
+        low, high = fixed_range(m, role, j, held, edges, fixed)
         for place in range(j + high - low if role[j] < AWAY else 0):
-            i = place if place < j else -1 - (low + place - j)
+            i = partner(place, j, low)
             if i >= 0 and role[i] >= AWAY:
                 continue
             if i >= 0 and role[i] == PRESCRIBED and role[j] == PRESCRIBED:
@@ -156,9 +157,9 @@ def _list_near_drift(
     """List the pairs that can meet in h s at the mean velocities of a drift."""
     count, fixed = 0, len(walls) + len(obstacles)
     for j in range(len(m)):
-        low, high = fixed_range(role, j, held, edges, fixed)
+        low, high = fixed_range(m, role, j, held, edges, fixed)
         for place in range(j + high - low if role[j] < AWAY else 0):
-            i = place if place < j else -1 - (low + place - j)
+            i = partner(place, j, low)
             if i < 0 or role[i] < AWAY:
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
                 if gap + closing(m, DX, i, j, nx, ny) * h < RELEASE:
@@ -248,7 +249,7 @@ def drift(
             if longest < h and attempt < REFINEMENTS - 1:
                 h = longest
                 continue
-            count = _list_near_drift(*(m, role, walls, obstacles, held, edges, h, near))
+            count = _list_near_drift(m, role, walls, obstacles, held, edges, h, near)
         if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
             break
         share = _first_touch(m, role, walls, obstacles, goal_lines, near, count, h)

@@ -15,7 +15,11 @@ from marl_airhockey.backends.numba.arrays import (
     STEP_TIME,
     Batch,
 )
-from marl_airhockey.backends.numba.geometry import RELEASE, distance_to_fixed
+from marl_airhockey.backends.numba.geometry import (
+    RELEASE,
+    distance_to_fixed,
+    stays_in_reach,
+)
 from marl_airhockey.core.laws import cap, fly_slowed
 from marl_airhockey.types import Array
 
@@ -98,6 +102,12 @@ def _may_touch(batch: Batch, b: int) -> bool:
         if i >= paddles and result.out[b, i - paddles]:
             continue
         ex, ey, lx, ly = _control_points(batch, b, i)
+        if i < paddles and not batch.commands.prescribed[b, i]:
+            x, y, low = position[b, i, 0], position[b, i, 1], i * static.edges
+            edges = low, low + static.edges
+            way = ex, ey, lx, ly
+            inside, stays = stays_in_reach(x, y, way, walls, *edges, radius[i])
+            near |= inside and not stays
         for j in range(i + 1, movers):
             if paddles <= j < first and result.out[b, j - paddles]:
                 continue

@@ -22,6 +22,8 @@ TOUCH = 1e-6
 """Gap below which two bodies are in contact at any speed (m)."""
 CREEP = 0.02
 """Closing speed above which bodies must come nearer than `NEAR`, to `TOUCH` (m/s)."""
+OUTSIDE = 1e-9
+"""Distance beyond the edge of its reach at which a paddle is outside (m)."""
 RELEASE = 1e-3
 """Gap beyond which a contact has ended, so that the next one is a new one (m)."""
 
@@ -95,6 +97,36 @@ def ahead_of_mouth(x: float, y: float, walls: Array, f: int) -> float:
     if not abs(aside) < walls[f, HALF] < np.inf:
         return np.inf
     return float(nx * x + ny * y + walls[f, OFFSET])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def stays_in_reach(
+    x: float,
+    y: float,
+    points: tuple[float, float, float, float],
+    walls: Array,
+    low: int,
+    high: int,
+    radius: float,
+) -> tuple[bool, bool]:
+    """Return whether a paddle is within its reach, and whether its way stays there.
+
+    Args:
+        x: m.
+        y: m.
+        points: two points that its way lies between, from where it is, m.
+        walls: see `make_walls`.
+        low: first edge of the reach.
+        high: the one after the last.
+        radius: of the paddle, m.
+    """
+    within, ahead = np.inf, np.inf
+    for f in range(low, high):
+        nx, ny = walls[f, NORMAL_X], walls[f, NORMAL_Y]
+        here = nx * x + ny * y + walls[f, OFFSET] - radius
+        way = min(nx * points[0] + ny * points[1], nx * points[2] + ny * points[3])
+        within, ahead = min(within, here), min(ahead, here + way)
+    return within > -OUTSIDE, ahead > -OUTSIDE
 
 
 @njit(cache=True, error_model="numpy")

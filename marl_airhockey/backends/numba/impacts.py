@@ -17,13 +17,15 @@ from marl_airhockey.types import Array
 
 X, Y, VX, VY, SPIN, ANGLE, RADIUS, MASS, EDGE = range(9)
 DX, DY, CX, CY, EX, EY, GX, GY, REACH, BEND = range(9, 19)
-EARLY_X, EARLY_Y, LATE_X, LATE_Y, FALL = range(19, 24)
-BODY = 24
+EARLY_X, EARLY_Y, LATE_X, LATE_Y, FALL, INSIDE, HELD = range(19, 26)
+BODY = 26
 """Columns of a body: position, velocity, spin, angle and radius; inverse mass, and
 that of a spinning disc's edge (radius squared over its inertia); in the coming drift
 its mean velocity with contacts and without, and its velocity at the end; for paddles
 the velocity at the end of the step; highest speed (m/s) and acceleration (m/s2) in what
-is left of the step."""
+is left of the step; two points that its way lies between, from where it is, and how far
+it falls besides (m); for paddles 1 if it began within its reach, and 1 if it could get
+out, so that the edges hold it."""
 
 ASKS, PRESCRIBED, PUCK, BLOCK, AWAY, PINNED = range(6)
 """Roles of bodies: a paddle that stops where a puck cannot give way, one that does not;
@@ -38,9 +40,9 @@ SLOP = 2e-4
 """Overlap that is left alone (m)."""
 TIMES = 4
 """Number of times that a contact returns its restitution at one moment."""
-IMPACTS = 32
+IMPACTS = 16
 """Number of impacts per contact before a paddle has to stop."""
-STOPS = 60
+STOPS = 20
 """Number of inelastic impacts per contact before what still closes stands still."""
 MULTIPLE = 3.0
 """A contact leaves no puck faster than the fastest body before, times this."""
@@ -201,13 +203,14 @@ def solve(
             x, y = m[i, at], m[i, at + 1]
             if role[i] > PRESCRIBED and (x != kept[i, 0] or y != kept[i, 1]):
                 calm &= x * x + y * y <= MULTIPLE * MULTIPLE * top + TINY
-    if calm:
-        return
-    if paddle:
-        for i in range(len(m)):
+    if not calm:
+        for i in range(len(m) if paddle else 0):
             if role[i] > PRESCRIBED:
                 m[i, at], m[i, at + 1], m[i, SPIN] = kept[i, 0], kept[i, 1], kept[i, 2]
-    _stop_paddles(m, role, at, pairs, contacts, visits, n)
+        _stop_paddles(m, role, at, pairs, contacts, visits, n)
+    for i in range(len(m) if paddle else 0):
+        if role[i] == ASKS and (m[i, at] != kept[i, 0] or m[i, at + 1] != kept[i, 1]):
+            m[i, HELD] = m[i, INSIDE]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -293,11 +296,14 @@ def _stop_paddles(
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def fixed_range(
-    role: Array, j: int, held: int, edges: int, end: int
+    m: Array, role: Array, j: int, held: int, edges: int, end: int
 ) -> tuple[int, int]:
     """Return the first fixed object that body j can touch, and the one after the last.
 
+    The edges of its reach are in the way of a paddle that `HELD` marks.
+
     Args:
+        m: bodies.
         role: roles.
         j: body.
         held: number of walls that hold paddles, ``edges`` each, which come first.
@@ -306,7 +312,23 @@ def fixed_range(
     """
     if role[j] > PRESCRIBED:
         return held, end
-    return (j * edges, (j + 1) * edges) if role[j] == ASKS else (0, 0)
+    is_held = role[j] == ASKS and m[j, HELD] > 0.0
+    return (j * edges, (j + 1) * edges) if is_held else (0, 0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def slop(role: Array, i: int, j: int) -> float:
+    """Return the overlap of body j with i that is left alone, m: none with an edge."""
+    return 0.0 if i < 0 and role[j] <= PRESCRIBED else SLOP
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def partner(place: int, j: int, low: int) -> int:
+    """Return what comes at a place in the list of all that body j can touch.
+
+    The bodies before it come first, then its fixed objects, from ``low`` on.
+    """
+    return place if place < j else -1 - (low + place - j)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -318,7 +340,7 @@ def take_apart(
     Args:
         m: bodies, moved.
         role: roles.
-        walls: walls, of which the first hold pucks.
+        walls: walls.
         obstacles: obstacles.
         held: see `fixed_range`, like the next.
         edges: of each paddle's reach.
@@ -328,13 +350,13 @@ def take_apart(
         deepest = 0.0
         for j in range(len(m)):
             # Fixed objects last, which no body is left in.
-            low, high = fixed_range(role, j, held, edges, fixed)
+            low, high = fixed_range(m, role, j, held, edges, fixed)
             for place in range(j + high - low):
-                i = j - 1 - place if place < j else -1 - (low + place - j)
+                i = partner(place, j, low)
                 if role[j] >= AWAY or (i >= 0 and role[i] >= AWAY):
                     continue
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
-                deep = -gap - SLOP
+                deep = -gap - slop(role, i, j)
                 if deep <= 0.0:
                     continue
                 wi, wj, _, _ = shares(m, role, i, j, sweep >= 12)
@@ -344,8 +366,27 @@ def take_apart(
                 mine, other = wi / (wi + wj), wj / (wi + wj)
                 m[j, X] += nx * deep * other
                 m[j, Y] += ny * deep * other
+                m[j, HELD] = m[j, INSIDE]
                 if i >= 0:
                     m[i, X] -= nx * deep * mine
                     m[i, Y] -= ny * deep * mine
+                    m[i, HELD] = m[i, INSIDE]
         if deepest < 1e-6:
             return
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def keep_in_reach(m: Array, walls: Array, paddles: int, edges: int) -> None:
+    """Move paddles that could get out of their reaches back to the edge."""
+    for j in range(paddles):
+        for _ in range(100 if m[j, HELD] > 0.0 else 0):
+            outside = 0.0
+            for f in range(j * edges, (j + 1) * edges):
+                gap, nx, ny = distance_to_fixed(m[j, X], m[j, Y], f, walls, walls)
+                deep = m[j, RADIUS] - gap
+                if deep > 0.0:
+                    outside = max(outside, deep)
+                    m[j, X] += deep * nx
+                    m[j, Y] += deep * ny
+            if outside < 1e-12:
+                break

@@ -35,6 +35,7 @@ from marl_airhockey.backends.numba.geometry import (
     RELEASE,
     ahead_of_mouth,
     in_contact,
+    stays_in_reach,
 )
 from marl_airhockey.backends.numba.impacts import (
     ANGLE,
@@ -45,6 +46,8 @@ from marl_airhockey.backends.numba.impacts import (
     FRICTION,
     GX,
     GY,
+    HELD,
+    INSIDE,
     MASS,
     NX,
     NY,
@@ -54,7 +57,6 @@ from marl_airhockey.backends.numba.impacts import (
     RADIUS,
     REACH,
     RESTITUTION,
-    SLOP,
     SPIN,
     TINY,
     VX,
@@ -63,6 +65,8 @@ from marl_airhockey.backends.numba.impacts import (
     Y,
     closing,
     distance_between,
+    keep_in_reach,
+    slop,
     solve,
     take_apart,
 )
@@ -200,6 +204,16 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
     pairs = view(at, (size, 2), np.int64)
     visits = view(at + 8 * size * 2, (size,), np.int64)
 
+    def hold(i: int) -> None:
+        # The edges of its reach matter to a paddle whose way leads beyond them.
+        half, low, vx, vy = 0.5 * control_dt, i * edges, m[i, VX], m[i, VY]
+        late = half * (vx + m[i, GX]), half * (vy + m[i, GY])
+        way, place = (half * vx, half * vy, *late), (m[i, X], m[i, Y])
+        inside, stays = stays_in_reach(
+            *place, way, walls, low, low + edges, m[i, RADIUS]
+        )
+        m[i, INSIDE], m[i, HELD] = inside, inside and not stays
+
     def enter(b: int) -> None:
         for g in range(len(goal_lines)):
             f = goal_lines[g, 1]
@@ -208,45 +222,39 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                 walls[f + 1, HALF] = np.inf if closed[b, g] else shared[f + 1, HALF]
         for i in range(movers):
             place, motion = previous.position[b, i], previous.velocity[b, i]
-            m[i, X], m[i, Y], m[i, VX], m[i, VY] = (
-                place[0],
-                place[1],
-                motion[0],
-                motion[1],
-            )
+            m[i, X], m[i, Y] = place[0], place[1]
+            m[i, VX], m[i, VY] = motion[0], motion[1]
             m[i, RADIUS], m[i, ANGLE] = radius[i], previous.angle[b, i]
             m[i, SPIN] = m[i, MASS] = m[i, EDGE] = 0.0
             if i < paddles:
                 role[i] = PRESCRIBED if prescribed[b, i] else ASKS
                 m[i, GX], m[i, GY] = goal[b, i, 0], goal[b, i, 1]
+                m[i, INSIDE] = m[i, HELD] = 0.0
                 if prescribed[b, i]:
                     m[i, VX], m[i, VY] = m[i, GX], m[i, GY]
+                else:
+                    hold(i)
                 if raised[b, i]:
                     role[i] = AWAY
                 for k in range(pucks):
                     touching[b, i, k] = previous.touching[b, i, k] and not raised[b, i]
             elif i < first:
                 role[i] = AWAY if out[b, i - paddles] else PUCK
-                m[i, SPIN], m[i, MASS] = (
-                    previous.spin[b, i],
-                    1.0 / coefficients[b, PUCK_MASS],
-                )
+                m[i, SPIN] = previous.spin[b, i]
+                m[i, MASS] = 1.0 / coefficients[b, PUCK_MASS]
                 m[i, EDGE] = 2.0 * m[i, MASS]
             else:
                 role[i], m[i, MASS] = BLOCK_ROLE, 1.0 / coefficients[b, BLOCK_MASS]
 
-    def keep_below_the_cap(i: int) -> None:
-        share = cap(m[i, VX], m[i, VY])
-        if share < 1.0:
-            m[i, VX] *= share
-            m[i, VY] *= share
-
-    def leave(b: int) -> None:
+    def keep_below_the_cap() -> None:
         for i in range(paddles, first):
             share = cap(m[i, VX], m[i, VY])
             if share < 1.0:
                 m[i, VX] *= share
                 m[i, VY] *= share
+
+    def leave(b: int) -> None:
+        keep_in_reach(m, walls, paddles, edges)
         for i in range(movers, position.shape[1]):
             for axis in range(2):
                 position[b, i, axis] = previous.position[b, i, axis]
@@ -257,12 +265,12 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
         for k in range(pucks):
             i = paddles + k
             angle[b, i] = m[i, ANGLE]
-            held = role[i] == PINNED
+            pressed = role[i] == PINNED
             for j in range(paddles):
                 if role[j] == PRESCRIBED and role[i] == PUCK:
                     gap, _, _ = distance_between(m, j, i, walls, obstacles)
-                    held |= gap < -RELEASE
-            pinned[b, k] = pinned[b, k] + control_dt if held else 0.0
+                    pressed |= gap < -RELEASE
+            pinned[b, k] = pinned[b, k] + control_dt if pressed else 0.0
             if pinned[b, k] > PATIENCE - 1e-9:
                 lifted[b, k] = out[b, k] = True
             if out[b, k]:
@@ -347,25 +355,14 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
             continue
         clear_events(batch, b)
         enter(b)
-        for i in range(paddles, first):
-            keep_below_the_cap(i)
+        keep_below_the_cap()
+        world = m, role, coefficients[b], walls, obstacles, held, edges
         left, rounds, moment, count = control_dt, 0, 0, 0
         stale, solved, bend = True, False, 0.0
         while True:
             rounds += 1
             if stale:
-                count = list_near(
-                    *(
-                        m,
-                        role,
-                        coefficients[b],
-                        walls,
-                        obstacles,
-                        paddles * edges,
-                        edges,
-                    ),
-                    *(left, near),
-                )
+                count = list_near(*world, left, near)
                 bend, stale = longest_drift(m, role, near, count), False
             n, hits, safe = 0, False, np.inf
             for k in range(count):
@@ -388,8 +385,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                         safe = min(safe, max(ahead, 0.0) / max(m[i, REACH], 1e-9))
             if hits and not solved:
                 solve(m, role, VX, pairs, contacts, visits, kept, n)
-                for i in range(paddles, first):
-                    keep_below_the_cap(i)
+                keep_below_the_cap()
                 stale = solved = True
                 continue
             solved = False
@@ -404,26 +400,28 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
             h = min(max(bend, safe), left, until)
             if rounds > 60:
                 h = min(max(h, control_dt / 50), left)
-            world = (
-                m,
-                role,
-                coefficients[b],
-                walls,
-                obstacles,
-                paddles * edges,
-                edges,
+            h, stale = drift(
+                *world,
                 goal_lines,
+                near,
+                count,
+                pairs,
+                contacts,
+                visits,
+                kept,
+                n,
+                left,
+                h,
+                safe,
+                rounds <= 60,
             )
-            met = pairs, contacts, visits, kept, n
-            h, stale = drift(*world, near, count, *met, left, h, safe, rounds <= 60)
             left = left - h if left - h > 1e-12 else 0.0
             cross(b)
             deep = False
             for k in range(count):
-                gap, _, _ = distance_between(
-                    m, near[k, 0], near[k, 1], walls, obstacles
-                )
-                deep |= gap < -SLOP
+                i, j = near[k, 0], near[k, 1]
+                gap, _, _ = distance_between(m, i, j, walls, obstacles)
+                deep |= gap < -1e-9 - slop(role, i, j)
             if deep:
                 take_apart(m, role, walls, obstacles, held, edges)
                 stale = True
@@ -431,6 +429,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                 if left > 0.0:
                     record(b, moment)
                 moment += 1
+        keep_below_the_cap()
         if path.shape[1] > 0:
             record(b, moments)
         leave(b)

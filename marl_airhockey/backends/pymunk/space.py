@@ -10,7 +10,7 @@ import numpy as np
 import pymunk
 
 from marl_airhockey.backends._planar.overlaps import give_way
-from marl_airhockey.backends._planar.paddles import ramp_paddles
+from marl_airhockey.backends._planar.paddles import keep_in_reach, ramp_paddles
 from marl_airhockey.backends._planar.walls import depth_in_side, sides
 from marl_airhockey.backends.pymunk.building import (
     BLOCK,
@@ -27,6 +27,7 @@ from marl_airhockey.contracts.backend import PATIENCE
 from marl_airhockey.core.laws import cap, fly, wall_restitution
 from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import reaches
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
@@ -64,6 +65,9 @@ class Space:
         self.bodies, self._walls = Bodies(space, scene), Walls(space, scene)
         self._sides, self._elapsed = sides(scene), 0.0
         self._radius = np.array(bodies.radius)[: bodies.paddles + bodies.pucks]
+        self._reach = reaches(scene.table, scene.seats)
+        self._held = np.zeros(bodies.paddles, np.bool_)
+        """True for paddles that began the step in their reaches, which hold them."""
         self._out: dict[int, tuple[float, float]] = {}
         """Positions at which pucks left play, by puck, m."""
         self._initial_contacts: set[tuple[int, int]] = set()
@@ -165,10 +169,13 @@ class Space:
         (position, velocity), (goal, imposed, raised) = paddles, command
         mean, size = np.zeros(goal.shape), 2 * self.scene.table.paddle_radius
         seats = self.scene.bodies.paddle
+        normals, offsets = self._reach
+        inside = (normals * position[:, None]).sum(-1) + offsets > -1e-9
+        self._held = inside.all(-1) & ~imposed
         count = self._count(velocity, goal)
         self.dt, every = self.control_dt / count, count // self.substeps
         self._begin()
-        self._lift(raised)
+        self._raise(raised)
         if path is not None:
             self.read(path[0], velocity)
         self._leap(0.5 * self.dt)
@@ -176,6 +183,7 @@ class Space:
             self._elapsed, left = (k + 1) * self.dt, count - k
             motion = position, velocity, goal, imposed, raised, left, self.dt, size
             overlap = ramp_paddles(*motion, mean)
+            overlap |= keep_in_reach(position, velocity, self._held, *self._reach)
             for i, body in enumerate(self.bodies.all[seats]):
                 body.velocity = tuple(mean[i].tolist())
                 if overlap:
@@ -190,7 +198,7 @@ class Space:
         self._leap(-0.5 * self.dt)
         self._keep_below_the_cap()
         self._initial_contacts.clear()
-        self._lift(np.zeros_like(raised))
+        self._raise(np.zeros_like(raised))
         self._lift_pinned(position, imposed, raised)
 
     def _count(self, velocity: Array, goal: Array) -> int:
@@ -254,9 +262,9 @@ class Space:
             self._park(k)
         self._contact = bool(self._out) or bool(self.touching.any())
 
-    def _lift(self, lifted: Array) -> None:
-        """Disable contacts of the paddles that ``lifted`` (paddles,) marks."""
-        for shape, up in zip(self.bodies.shapes, lifted.tolist(), strict=False):
+    def _raise(self, raised: Array) -> None:
+        """Disable contacts of the paddles that ``raised`` (paddles,) marks."""
+        for shape, up in zip(self.bodies.shapes, raised.tolist(), strict=False):
             wanted = NOTHING if up else EVERYTHING
             if shape.filter != wanted:
                 shape.filter = wanted
@@ -310,33 +318,28 @@ class Space:
         arbiter.friction = self._values["puck_friction"]
 
     def _bounce(self, arbiter: pymunk.Arbiter, *_: object) -> None:
-        """Set the laws of a puck at a wall, which depend on its normal speed."""
-        puck, _wall = self._ordered(arbiter, PUCK)
-        assert puck.body is not None
-        speed = abs(puck.body.velocity.dot(arbiter.normal))
-        arbiter.restitution = wall_restitution(
-            speed,
-            self._values["wall_restitution"],
-            self._values["wall_restitution_slope"],
-        )
+        """Set the laws of a puck at a wall."""
+        arbiter.restitution = self._at_wall(arbiter, PUCK)
         arbiter.friction = self._values["wall_friction"]
 
     def _shove(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         """Set the laws of a block, which returns no more than what it meets."""
-        block, other = self._ordered(arbiter, BLOCK)
+        _block, other = self._ordered(arbiter, BLOCK)
         arbiter.restitution = self._values["block_restitution"]
         arbiter.friction = 0.0
         if other.collision_type == PUCK:
             arbiter.friction = self._values["puck_friction"]
         elif other.collision_type in (WALL, GOAL_LINE):
-            assert block.body is not None
-            speed = abs(block.body.velocity.dot(arbiter.normal))
-            wall = wall_restitution(
-                speed,
-                self._values["wall_restitution"],
-                self._values["wall_restitution_slope"],
-            )
+            wall = self._at_wall(arbiter, BLOCK)
             arbiter.restitution = min(arbiter.restitution, wall)
+
+    def _at_wall(self, arbiter: pymunk.Arbiter, kind: int) -> float:
+        """Return the restitution at a wall, which depends on the normal speed."""
+        shape, _wall = self._ordered(arbiter, kind)
+        assert shape.body is not None
+        speed = abs(shape.body.velocity.dot(arbiter.normal))
+        names = "wall_restitution", "wall_restitution_slope"
+        return float(wall_restitution(speed, *(self._values[n] for n in names)))
 
     @staticmethod
     def _ordered(
@@ -371,6 +374,8 @@ class Space:
         if not give_way(places, velocity, *what):
             return
         position[:] = places[:paddles]
+        keep_in_reach(position, velocity, self._held, *self._reach)
+        places[:paddles] = position
         for i in np.flatnonzero((places != before).any(-1)).tolist():
             body = self.bodies.all[i]
             body.position = float(places[i, 0]), float(places[i, 1])
