@@ -52,7 +52,8 @@ class HitGoalVelocity(GoalScenario):
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
         puck, goal = legal_shots(rng, self.scene)
-        state.position[:, 1], state.velocity[:, 1] = puck[:, :2], puck[:, 2:]
+        state.position[:, 1], state.velocity[:, 1] = puck[:, :2], puck[:, 2:4]
+        state.spin[:, 1] = puck[:, 4] / self.scene.table.puck_radius
         return state, self._memory(state, rng, goal)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

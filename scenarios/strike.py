@@ -27,11 +27,11 @@ class Strike(Scenario):
     """Task that rewards the best speed of the puck so far, and approaching it.
 
     Success requires speed and distance in the same step: a pushed puck is not struck.
-    From rest a 0.7 m/s paddle gives at most 1.295 m/s.
+    From rest a 0.7 m/s paddle gives at most 1.05 m/s.
     """
 
     seconds: float = 2.0
-    fast: float = 1.0
+    fast: float = 0.9
     """Wanted speed of the puck (m/s)."""
     distance: float = 0.3
     """Wanted distance of the puck from its start (m)."""

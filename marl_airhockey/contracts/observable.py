@@ -105,6 +105,8 @@ class EgoView:
         """(..., S, pucks, 2) m"""
         self.puck_velocity = self.rotate(state.puck_velocity)
         """(..., S, pucks, 2) m/s"""
+        self.puck_edge = state.puck_edge[..., None, :]
+        """(..., 1, pucks) m/s, the same from every seat"""
 
     def rotate(self, vectors: Array) -> Array:
         """Rotate (..., n, 2) of the table frame to ego frames, (..., S, n, 2)."""

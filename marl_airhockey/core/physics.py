@@ -41,18 +41,18 @@ class Parameter:
 PARAMETERS: dict[str, Parameter] = {
     "tilt": Parameter(5.5, -45.0, 45.0, "deg", "slope toward home"),
     "cross_tilt": Parameter(0.0, -45.0, 45.0, "deg", "slope toward the right"),
-    "puck_drag": Parameter(0.0, 0.0, 1.0, "1/m", "quadratic drag of a puck"),
-    "puck_damping": Parameter(0.15, 0.0, 10.0, "1/s", "linear drag of a puck"),
-    "wall_restitution": Parameter(0.9, 0.0, 1.0, "1", "at walls, at 1 m/s"),
+    "puck_drag": Parameter(0.02, 0.0, 1.0, "1/m", "quadratic drag of a puck"),
+    "puck_damping": Parameter(0.0, 0.0, 10.0, "1/s", "linear drag of a puck"),
+    "wall_restitution": Parameter(0.85, 0.0, 1.0, "1", "at walls, at 1 m/s"),
     "wall_restitution_slope": Parameter(
-        0.0, -0.2, 0.2, "1", "its loss per ln(m/s) of normal speed"
+        0.02, -0.2, 0.2, "1", "its loss per ln(m/s) of normal speed"
     ),
-    "wall_friction": Parameter(0.0, 0.0, 2.0, "1", "Coulomb, puck at walls"),
-    "paddle_restitution": Parameter(0.85, 0.0, 1.0, "1", "puck at a paddle"),
-    "paddle_friction": Parameter(0.0, 0.0, 2.0, "1", "Coulomb, puck at a paddle"),
-    "puck_restitution": Parameter(1.0, 0.0, 1.0, "1", "puck at a puck"),
-    "puck_friction": Parameter(0.0, 0.0, 2.0, "1", "Coulomb, puck at puck or block"),
-    "block_restitution": Parameter(0.9, 0.0, 1.0, "1", "of blocks"),
+    "wall_friction": Parameter(0.12, 0.0, 2.0, "1", "Coulomb, puck at walls"),
+    "paddle_restitution": Parameter(0.5, 0.0, 1.0, "1", "puck at a paddle"),
+    "paddle_friction": Parameter(0.1, 0.0, 2.0, "1", "Coulomb, puck at a paddle"),
+    "puck_restitution": Parameter(0.9, 0.0, 1.0, "1", "puck at a puck"),
+    "puck_friction": Parameter(0.1, 0.0, 2.0, "1", "Coulomb, puck at puck or block"),
+    "block_restitution": Parameter(0.7, 0.0, 1.0, "1", "of blocks"),
     "puck_mass": Parameter(0.03, 0.001, 1.0, "kg", "mass of a puck"),
     "block_mass": Parameter(0.06, 0.001, 5.0, "kg", "mass of a block"),
     "block_friction": Parameter(2.4, 0.0, 20.0, "m/s2", "Coulomb friction of blocks"),
@@ -69,19 +69,16 @@ PARAMETERS: dict[str, Parameter] = {
 """Physical parameters by name."""
 
 
+LAWS = (
+    *("puck_drag", "puck_damping", "wall_restitution", "wall_restitution_slope"),
+    *("wall_friction", "paddle_restitution", "paddle_friction"),
+    *("puck_restitution", "puck_friction", "block_restitution"),
+)
+"""Names of the parameters of the laws of pucks."""
+
+
 PRESETS: dict[str, dict[str, float]] = {
-    "professional": {
-        "puck_drag": 0.02,
-        "puck_damping": 0.0,
-        "wall_restitution": 0.85,
-        "wall_restitution_slope": 0.02,
-        "wall_friction": 0.12,
-        "paddle_restitution": 0.5,
-        "paddle_friction": 0.1,
-        "puck_restitution": 0.9,
-        "puck_friction": 0.1,
-        "block_restitution": 0.7,
-    },
+    "professional": {name: PARAMETERS[name].default for name in LAWS},
     "wooden": {
         "puck_drag": 0.027,
         "puck_damping": 0.0,
@@ -108,7 +105,9 @@ PRESETS: dict[str, dict[str, float]] = {
         "block_restitution": 0.9,
     },
 }
-"""Presets by name. ``professional`` and ``wooden`` are round numbers of two real tables
+"""Presets by name.
+
+``professional``, the default, and ``wooden`` are round numbers of two real tables
 measured in play; friction at paddles, between pucks and the restitutions of pucks and
 blocks could not be measured there and are guesses. ``authors`` is what the paper's
 authors identified on their table, a pull of 0.687 m/s2 and a linear drag.

@@ -41,7 +41,8 @@ def make_seat(
     ``robot``: what a UR5e can hold with its base 0.22 m behind its edge, a box of
     0.42 x 0.50 m that begins 78 mm from the edge, with far corners cut at the slope of
     0.8 that the paper's authors use, as far as it lies in the side's territory.
-    ``arcade``: all of the territory. Centres keep a paddle's radius inside of it.
+    ``arcade``: all of the territory, at what an arm of a person or a gantry reaches.
+    Centres keep a paddle's radius inside of it.
 
     Args:
         kind: "robot" or "arcade".
@@ -68,7 +69,7 @@ def make_seat(
         ]
         polygon, speed, acceleration = np.array(box), 0.7, 7.0
     else:
-        polygon, speed, acceleration = np.asarray(table.vertices) @ ego, 2.5, 40.0
+        polygon, speed, acceleration = np.asarray(table.vertices) @ ego, 5.0, 50.0
     for normal, offset in zip(normals, table.offsets, strict=True):
         polygon = clip(polygon, normal, offset - table.paddle_radius)
     own = np.array([1.0, 0.0])

@@ -130,6 +130,13 @@ class State:
         return self.velocity[..., self.bodies.puck, :]
 
     @property
+    def puck_edge(self) -> Array:
+        """Speeds of the pucks' edges by their spin (..., pucks), m/s."""
+        pucks = self.bodies.puck
+        radius = np.array(self.bodies.radius[pucks])
+        return np.asarray(radius * self.spin[..., pucks])
+
+    @property
     def block(self) -> Array:
         """Positions of the blocks (..., blocks, 2), m."""
         return self.position[..., self.bodies.block, :]

@@ -29,6 +29,7 @@ def world_state(world: World) -> dict[str, Any]:
         "time": round(float(state.time), 3),
         "paddles": rounded(state.paddle),
         "pucks": rounded(np.hstack([state.puck, state.puck_velocity])),
+        "puck_angles": rounded(state.angle[state.bodies.puck]),
         "blocks": rounded(state.position[state.bodies.block]),
         "angles": rounded(state.angle[state.bodies.block]),
         "marks": [

@@ -70,6 +70,8 @@ def _state(blank: State, row: dict[str, Any]) -> State:
     position[bodies.paddle] = row["paddles"]
     if row["pucks"]:
         position[bodies.puck] = np.array(row["pucks"])[:, :2]
+        # Recordings of before the laws of a real table have no spin.
+        angle[bodies.puck] = row.get("puck_angles", 0.0)
     if row["blocks"]:
         position[bodies.block], angle[bodies.block] = row["blocks"], row["angles"]
     return replace(blank, position=position, angle=angle)

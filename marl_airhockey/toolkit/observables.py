@@ -79,7 +79,10 @@ def _others(scene: Scene) -> Array:
 
 @dataclass(frozen=True)
 class Pucks(Observable):
-    """Position and velocity of every puck, or its sensed history."""
+    """Position, velocity and spin of every puck, or its sensed history.
+
+    The spin is the speed of the edge, radius times angular velocity, counter-clockwise.
+    """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         columns: list[Column] = []
@@ -87,6 +90,8 @@ class Pucks(Observable):
             if scope.observe == "velocity":
                 columns += scope.position_columns(f"puck_{i}", (0.67, 0.25))
                 columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
+                most = PUCK_SPEED_CAP
+                columns.append(Column(f"puck_{i}.spin", -most, most, 0.5))
             else:
                 for ago in range(HISTORY - 1, -1, -1):
                     columns += scope.position_columns(f"puck_{i}[-{ago}]", (0.67, 0.25))
@@ -96,8 +101,9 @@ class Pucks(Observable):
     def write(self, ego: EgoView, out: Array) -> None:
         if ego.scope.observe == "velocity":
             for i in range(ego.scope.scene.pucks):
-                out[..., 4 * i : 4 * i + 2] = ego.puck[..., i, :]
-                out[..., 4 * i + 2 : 4 * i + 4] = ego.puck_velocity[..., i, :]
+                out[..., 5 * i : 5 * i + 2] = ego.puck[..., i, :]
+                out[..., 5 * i + 2 : 5 * i + 4] = ego.puck_velocity[..., i, :]
+                out[..., 5 * i + 4] = ego.puck_edge[..., i]
             return
         lead = ego.history.shape[:-3]
         flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 3)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 
 import numpy as np
 from numba import njit
 
-from marl_airhockey.core.geometry import half_planes
+from marl_airhockey.core.geometry import half_planes, length
+from marl_airhockey.core.laws import fly, impulse, wall_restitution
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
+from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)
@@ -57,9 +59,11 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
 
         if k == first:
             state.position[:, k], state.velocity[:, k] = falling_puck(rng)
-            continue
-        puck = redraw(rng, lambda some: np.stack(falling_puck(some), 1), apart)
-        state.position[:, k], state.velocity[:, k] = puck[:, 0], puck[:, 1]
+        else:
+            puck = redraw(rng, lambda some: np.stack(falling_puck(some), 1), apart)
+            state.position[:, k], state.velocity[:, k] = puck[:, 0], puck[:, 1]
+        speed = length(state.velocity[:, k])
+        state.spin[:, k] = spin_of(rng, speed, scene.table.puck_radius)
     return state
 
 
@@ -88,7 +92,9 @@ def serve(
     motion = 0.5 * np.stack([np.cos(angle), np.sin(angle)], -1)
     some = slice(None) if rows is None else rows
     state.puck[some, puck], state.puck_velocity[some, puck] = place[some], motion[some]
-    state.spin[some, state.bodies.puck.start + puck] = 0.0
+    body = state.bodies.puck.start + puck
+    spin = spin_of(rng, length(motion), state.bodies.radius[body])
+    state.spin[some, body] = spin[some]
     state.touching[some, :, puck] = False
 
 
@@ -115,66 +121,65 @@ def puck_gap(state: State) -> Array:
     return np.asarray(np.hypot(gap[:, 0], gap[:, 1]))
 
 
-def roll(
-    position: Array,
-    velocity: Array,
-    times: Array,
-    pull: float,
-    damping: float,
-    half_width: float,
-    restitution: float,
-) -> Array:
-    """Compute, in closed form, a puck that slides, falls and banks off the long walls.
+def spin_of(rng: RandomStreams, speed: Array, radius: float) -> Array:
+    """Draw spins (W,), rad/s, that play leaves on pucks of some speeds (W,), m/s.
 
-    With drag c the lateral distance after time t is that of a puck without drag after
-    u = (1 - exp(-c t)) / c, so that banks happen at known u.
+    The edge has up to 0.6 of the puck's speed: nine in ten did on a real table, after
+    a bounce.
+    """
+    return np.asarray(rng.uniform(-0.6, 0.6) * speed / radius)
+
+
+def roll(
+    start: Array, seconds: float, count: int, half: float, physics: Mapping[str, float]
+) -> Array:
+    """Compute the ways of pucks that slide, fall and bank off the long walls.
 
     Args:
-        position: (W, 2) m.
-        velocity: (W, 2) m/s.
-        times: (T,) s, ascending.
-        pull: acceleration toward home, m/s2.
-        damping: drag c, 1/s, above 0.
-        half_width: largest |y| of the puck's centre, m.
-        restitution: restitution of the walls.
+        start: (W, 5) x, y, m, vx, vy and speed of the edge by spin, m/s.
+        seconds: time between two points of a way, s.
+        count: number of points T, the start included.
+        half: largest |y| of the puck's centre, m.
+        physics: parameters by name.
 
     Returns:
-        (W, T, 4) x, y, vx, vy.
+        (W, T, 5), columns as those of the start.
     """
-    out = np.empty((len(position), len(times), 4))
-    fade = np.exp(-damping * times)
-    start = np.concatenate([position, velocity], -1)
-    _roll(start, times, fade, pull / damping, damping, half_width, restitution, out)
+    names = (
+        *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
+        "wall_friction",
+    )
+    pull = -GRAVITY * np.sin(np.radians(physics["tilt"]))
+    laws = np.array([pull, *(physics[name] for name in names)])
+    out = np.empty((len(start), count, 5))
+    _roll(start, seconds, half, laws, out)
     return out
 
 
 @njit(cache=True, error_model="numpy")
-def _roll(
-    start: Array,
-    times: Array,
-    fade: Array,
-    fall: float,
-    damping: float,
-    half_width: float,
-    restitution: float,
-    out: Array,
-) -> None:
-    """Fill ``out`` (W, T, 4) for ``start`` (W, 4); ``fall`` is the terminal speed."""
-    for w in range(len(start)):
+def _roll(start: Array, h: float, half: float, laws: Array, out: Array) -> None:
+    """Fill ``out`` (W, T, 5) for ``start`` (W, 5)."""
+    pull, damping, drag, restitution = laws[0], laws[1], laws[2], laws[3]
+    slope, friction = laws[4], laws[5]
+    for w in range(len(out)):
         x, y, vx, vy = start[w, 0], start[w, 1], start[w, 2], start[w, 3]
-        side = -1.0 if vy < 0.0 else 1.0
-        speed, last, edge = max(abs(vy), 1e-9), 0.0, y
-        bank = (half_width - side * y) / speed
-        for t in range(len(times)):
-            u = (1.0 - fade[t]) / damping
-            while u >= bank and speed > 1e-9:
-                edge, last = side * half_width, bank
-                speed, side = speed * restitution, -side
-                bank += 2.0 * half_width / max(speed, 1e-9)
-            out[w, t, 0] = x + (vx + fall) * u - fall * times[t]
-            out[w, t, 1] = edge + side * speed * (u - last)
-            out[w, t, 2] = (vx + fall) * fade[t] - fall
-            out[w, t, 3] = side * speed * fade[t]
+        edge = start[w, 4]
+        for t in range(out.shape[1]):
+            way, left = out[w, t], h
+            way[0], way[1], way[2], way[3], way[4] = x, y, vx, vy, edge
+            dx, dy, ex, ey = fly(vx, vy, h, pull, 0.0, damping, drag)
+            if abs(y + dy) > half and vy * y > 0.0:
+                # As far as the wall, a bounce, and on.
+                share = max((half - abs(y)) / abs(dy), 0.0)
+                dx, dy, vx, vy = fly(vx, vy, share * h, pull, 0.0, damping, drag)
+                x, y, left = x + dx, y + dy, (1.0 - share) * h
+                # Along the normal turned by +90 degrees.
+                side = 1.0 if vy > 0.0 else -1.0
+                e = wall_restitution(abs(vy), restitution, slope)
+                push = impulse(abs(vy), side * vx - edge, e, friction, 1.0, 3.0)[1]
+                vx, vy, edge = vx + side * push, -e * vy, edge - 2.0 * push
+                dx, dy, ex, ey = fly(vx, vy, left, pull, 0.0, damping, drag)
+            x, y, vx, vy = x + dx, y + dy, ex, ey
 
 
 def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> Array:

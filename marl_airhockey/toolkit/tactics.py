@@ -14,6 +14,8 @@ from numba import njit
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
+from marl_airhockey.core.laws import impulse
+from marl_airhockey.core.physics import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
@@ -70,6 +72,10 @@ class Field:
     """Largest |y| of a shot at the own goal (m)."""
     targets: Array
     """Points in the goals of other teams (T, 2), m; empty without any."""
+    restitution: float
+    """Restitution of the walls that it counts on, at 1 m/s."""
+    friction: float
+    """Friction of the walls that it counts on."""
 
     @staticmethod
     def of(scene: Scene, seat: int) -> Field:
@@ -92,14 +98,10 @@ class Field:
         box = len(table.vertices) == 4 and me.side in (0, 2)
         half = float(table.size[1]) / 2 - table.puck_radius if box else np.inf
         targets = np.array(points).reshape(-1, 2) @ rotation.T
-        return Field(-float(table.offsets[me.side]), half, keep, targets)
-
-    def fold(self, y: Array) -> Array:
-        """Reflect ``y`` (m) of a puck that would pass the long walls."""
-        if not np.isfinite(self.half):
-            return y
-        wide = 4 * self.half
-        return np.asarray(self.half - np.abs((y + self.half) % wide - 2 * self.half))
+        laws = {k: PARAMETERS[k].default for k in ("wall_restitution", "wall_friction")}
+        laws = {k: scene.defaults.get(k, laws[k]) for k in laws}
+        edge = -float(table.offsets[me.side])
+        return Field(edge, half, keep, targets, *laws.values())
 
 
 def nearest_puck(view: View, lag: float) -> tuple[Array, Array]:
@@ -123,14 +125,55 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
     line = view.reach[:, 0].min() + depth
     place, motion = nearest_puck(view, lag)
     due = np.clip((place[:, 0] - line) / np.maximum(-motion[:, 0], 0.3), 0.0, 0.6)
-    coming = motion[:, 0] < 0.0
     wide = min(np.abs(view.reach[:, 1]).max(), field.keep)
-    aside = field.fold(place[:, 1] + np.where(coming, due, 0.0) * motion[:, 1])
+    due = np.where(motion[:, 0] < 0.0, due, 0.0)
+    laws = field.half, field.restitution, field.friction
+    aside = _slide_on(place, motion, due, *laws)[:, 1]
     return np.stack([np.full_like(aside, line), np.clip(aside, -wide, wide)], -1)
 
 
 STEP, HORIZON = 0.05, 1.2
 """Time step and horizon of the prediction of a puck's path (s)."""
+
+
+@njit(cache=True, error_model="numpy")
+def _place_after(
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    time: float,
+    half: float,
+    restitution: float,
+    friction: float,
+) -> tuple[float, float]:
+    """Return where a puck without spin and drag is after a time, long walls or not."""
+    for _ in range(4):
+        wall = half if vy > 0.0 else -half
+        due = max((wall - y) / vy, 0.0) if vy != 0.0 else np.inf
+        if due >= time:
+            break
+        x, y, time = x + vx * due, wall, time - due
+        push = impulse(abs(vy), vx, restitution, friction, 1.0, 3.0)[1]
+        vx, vy = vx + push, -restitution * vy
+    return x + vx * time, y + vy * time
+
+
+@njit(cache=True, error_model="numpy")
+def _slide_on(
+    place: Array,
+    motion: Array,
+    time: Array,
+    half: float,
+    restitution: float,
+    friction: float,
+) -> Array:
+    """Return the positions (W, 2) of pucks after some times (W,), s; m."""
+    out = np.empty_like(place)
+    for w in range(len(out)):
+        x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
+        out[w] = _place_after(x, y, vx, vy, time[w], half, restitution, friction)
+    return out
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,6 +187,8 @@ def _find_strike(
     high: Array,
     touch: float,
     half: float,
+    restitution: float,
+    friction: float,
 ) -> tuple[Array, Array, Array]:
     """Find when and where a paddle can first be behind a puck, and the direction then.
 
@@ -155,10 +200,8 @@ def _find_strike(
     for w in range(len(own)):
         due[w] = np.inf
         for moment in np.arange(0.0, HORIZON + 0.5 * STEP, STEP):
-            x = place[w, 0] + motion[w, 0] * moment
-            y = place[w, 1] + motion[w, 1] * moment
-            if np.isfinite(half):
-                y = half - abs((y + half) % (4 * half) - 2 * half)
+            x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
+            x, y = _place_after(x, y, vx, vy, moment, half, restitution, friction)
             ox, oy = aim[w, 0] - x, aim[w, 1] - y
             size = max(np.sqrt(ox * ox + oy * oy), 1e-6)
             ox, oy = ox / size, oy / size
@@ -199,8 +242,9 @@ def attack(
     touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
     low, high = view.reach.min(0), view.reach.max(0)
 
+    laws = field.half, field.restitution, field.friction
     due, there, way = _find_strike(
-        place, motion, own, speed, aim, low, high, touch, field.half
+        place, motion, own, speed, aim, low, high, touch, *laws
     )
     contact = there - way * touch
     gap = contact - own

@@ -94,10 +94,14 @@ class Sensor:
             position, velocity = state.position.copy(), state.velocity.copy()
             position[:, self.camera] = self._position
             velocity[:, self.camera] = self._speed
+            # A camera sees the middle of a puck, not how it turns.
+            spin = state.spin.copy()
+            spin[:, self.camera] = 0.0
             sensed = replace(
                 state,
                 position=position,
                 velocity=velocity,
+                spin=spin,
                 visible=state.visible & self._visible,
             )
         if self.keeps_history:

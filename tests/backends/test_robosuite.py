@@ -7,6 +7,7 @@ from pages import aim, line
 
 import marl_airhockey as ah
 from marl_airhockey.core.geometry import half_planes
+from marl_airhockey.core.physics import PARAMETERS
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import GRAVITY
@@ -107,6 +108,28 @@ def test_walls_and_paddles_return_their_share(puck, speed, share):
     states = puck.run(0.13 / speed + 2 * DT)
     assert states[-1].puck_velocity[0, 0, 0] / speed == pytest.approx(share, abs=0.03)
     assert sum(s.touched[0, 0, 0] for s in states) == 1
+
+
+@pytest.mark.parametrize("what", ["wall", "paddle"])
+def test_bounces_with_spin_and_friction_are_those_of_the_table(what):
+    rng = np.random.default_rng(0)
+    laws = {name: p.default for name, p in PARAMETERS.items()} | {"tilt": 0.0}
+    benches = [Bench(name, laws) for name in ("numba", "robosuite")]
+    axis, home = (1, (-0.7, 0.15)) if what == "wall" else (0, (-0.6, 0.0))
+    for speed in (0.4, 0.7, 1.0, 2.0, 3.0):
+        for _ in range(3):
+            aside, edge = rng.uniform(-1, 1) * speed, rng.uniform(-2, 2)
+            row = (0.0, 0.0, aside, speed) if axis else (-0.4, 0.0, -speed, 0.0)
+            ends = []
+            for bench in benches:
+                state = bench.reset(home, row)
+                state.spin[0, 1] = edge / TABLE.puck_radius
+                bench.backend.reset(state, np.arange(1))
+                ends.append(bench.run((0.28 if axis else 0.13) / speed + 2 * DT)[-1])
+            found = [(*s.puck_velocity[0, 0], s.puck_edge[0, 0]) for s in ends]
+            gap = np.abs(np.subtract(*found))
+            assert gap[axis] < 0.03 * speed
+            assert (np.delete(gap, axis) < 0.03 + 0.05 * speed).all()
 
 
 def test_drag_and_friction_are_those_of_the_other_backends():

@@ -81,4 +81,4 @@ def test_sb3_wrappers_seeds_and_saving(tmp_path):
     np.testing.assert_array_equal(first, second)
     models[0].save(tmp_path / "model.zip")
     policy = ah.load_policy(tmp_path / "model.zip")
-    assert policy.shape == (11,)
+    assert policy.shape == (12,)

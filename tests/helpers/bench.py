@@ -3,7 +3,7 @@
 import numpy as np
 
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.physics import PARAMETERS, PRESETS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES
@@ -12,10 +12,10 @@ from marl_airhockey.registry import find_backend
 TABLE = TABLES["standard"]
 DT = 0.05
 FLAT = {name: p.default for name, p in PARAMETERS.items()} | {
+    **PRESETS["frictionless"],
     "tilt": 0.0,
-    "puck_damping": 0.0,
 }
-"""The usual physics, but for a flat table without drag."""
+"""A flat table without drag and friction, which has closed forms."""
 
 
 class Bench:

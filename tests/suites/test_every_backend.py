@@ -10,7 +10,7 @@ from pair import Pair
 
 import marl_airhockey as ah
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import GRAVITY, Table
@@ -95,17 +95,18 @@ def test_drag_decays_the_speed_exponentially(backend):
         )
 
 
-def test_the_closed_form_of_banks_agrees(backend):
-    bench = Bench(backend, {"tilt": 5.5, "puck_damping": 0.15})
-    start = np.array([[-0.3, 0.1]]), np.array([[1.3, 0.9]])
-    bench.reset((-0.7, -0.2), (*start[0][0], *start[1][0]))
+def test_a_way_that_is_rolled_out_agrees(backend):
+    physics = {name: p.default for name, p in PARAMETERS.items()}
+    bench = Bench(backend, physics)
+    start = np.array([[-0.3, 0.1, 1.3, 0.9, 0.0]])
+    bench.reset((-0.7, -0.2), start[0, :4])
     states = bench.run(1.5)
-    times = np.array([s.time[0] for s in states])
-    pull = GRAVITY * np.sin(np.radians(5.5))
-    way = roll(*start, times, pull, 0.15, 0.3048 - 0.03175, 0.9)[0]
+    way = roll(start, DT / 10, 301, 0.3048 - 0.03175, physics)[0, 10::10]
     found = np.array([s.puck[0, 0] for s in states])
     # A bank is found up to a substep late.
     assert np.abs(found - way[:, :2]).max() < 0.9 * DT / 10 * 2
+    found = np.array([s.puck_edge[0, 0] for s in states])
+    np.testing.assert_allclose(found, way[:, 4], atol=0.02)
 
 
 @pytest.mark.parametrize("shape", ["disc", "square"])

@@ -117,7 +117,7 @@ def test_a_puck_and_a_paddle_at_all_angles_and_speeds(moving):
         command[:, 0] = polar(pace, rng.uniform(0, 2 * np.pi, worlds))
     pymunk, numba = play(table_with(), rows, 0.35, command)
     assert np.mean(np.any([s.touched.any((1, 2)) for s in pymunk], axis=0)) > 0.8
-    same_outcome(pymunk, numba, most=3)
+    same_outcome(pymunk, numba, most=2)
 
 
 def test_a_puck_strikes_a_block_head_on_and_glancing():

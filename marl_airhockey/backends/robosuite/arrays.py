@@ -10,6 +10,7 @@ import numpy as np
 from marl_airhockey.backends._planar.walls import sides
 from marl_airhockey.backends.robosuite.controller import SeatController
 from marl_airhockey.backends.robosuite.frames import TableFrame
+from marl_airhockey.backends.robosuite.sliding import Sliding
 from marl_airhockey.backends.robosuite.table_physics import TablePhysics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
@@ -46,8 +47,8 @@ class SimulationViews(NamedTuple):
     foot site; body of that site; force sensor"""
     movers: Array
     """Indices of x of pucks and blocks in qpos and in qvel (movers, 2)"""
-    coefficients: Array
-    """Coefficients of pucks and blocks (movers, 5): `TablePhysics.coefficients`"""
+    sliding: Sliding
+    """Arrays of the pucks and blocks"""
     gravity: Array
     """Gravity (3,), m/s2"""
     gains: Array
@@ -160,7 +161,7 @@ def make_views(
         sensors=data.sensordata,
         arms=arms,
         movers=np.stack([table_physics.qpos_index, table_physics.dofs], 1),
-        coefficients=table_physics.coefficients,
+        sliding=table_physics.sliding,
         gravity=model.opt.gravity,
         gains=np.array([hand.gains for hand in hands]),
         payloads=np.zeros(len(hands)),

@@ -131,7 +131,8 @@ class RobosuiteBackend(Backend):
         super().reset(state, worlds)
         for i in worlds.tolist():
             new = self.worlds[i].reset(
-                self._static, state.position[i], state.velocity[i], state.angle[i]
+                *(self._static, state.position[i], state.velocity[i]),
+                *(state.angle[i], state.spin[i]),
             )
             if new:
                 self._last_goal[i] = 0.0

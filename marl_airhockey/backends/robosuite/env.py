@@ -219,7 +219,8 @@ class AirHockey(ManipulationEnv):
     def _pre_action(self, action: Array, policy_step: bool = False) -> None:
         super()._pre_action(action, policy_step)
         assert self.table_physics is not None
-        self.table_physics.apply_friction()
+        hands = [(*h.position[:2], *h.velocity[:2]) for h in self.hands]
+        self.table_physics.apply_laws(np.array(hands))
 
     def _setup_observables(self) -> Any:
         return {}

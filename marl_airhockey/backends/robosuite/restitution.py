@@ -44,8 +44,9 @@ _RATIOS = np.geomspace(1e-5, 2.0, 500)
 _SHARES = restitution_of(_RATIOS)
 
 
-def solref(restitution: float, timestep: float) -> Array:
-    """Return the direct solref (2,) of contacts with a restitution."""
-    ratio = np.interp(-restitution, -_SHARES, _RATIOS)
+def solref(restitution: float | Array, timestep: float) -> Array:
+    """Return the direct solref (..., 2) of contacts with restitutions (...)."""
+    ratio = np.interp(-np.asarray(restitution), -_SHARES, _RATIOS)
     stiffness = (STIFFNESS / timestep) ** 2
-    return np.array([-stiffness, -2 * ratio * np.sqrt(stiffness)])
+    damping = -2 * ratio * np.sqrt(stiffness)
+    return np.stack([np.full_like(damping, -stiffness), damping], -1)

@@ -84,7 +84,12 @@ class Simulation:
         self.table_physics.set_physics(values)
 
     def reset(
-        self, static: StaticScene, position: Array, velocity: Array, angle: Array
+        self,
+        static: StaticScene,
+        position: Array,
+        velocity: Array,
+        angle: Array,
+        spin: Array,
     ) -> bool:
         """Place all bodies; return True if arms were moved, which are at rest then.
 
@@ -96,6 +101,7 @@ class Simulation:
             position: (bodies, 2) m.
             velocity: (bodies, 2) m/s.
             angle: (bodies,) rad.
+            spin: (bodies,) rad/s.
         """
         d, seats = self.data, self._seats
         moved = bool((position[:seats] != self.output.paddles[:, :2]).any())
@@ -104,7 +110,8 @@ class Simulation:
         for k, at in enumerate(self.table_physics.qpos_index):
             body, dof = seats + k, self.table_physics.dofs[k]
             d.qpos[at : at + 2], d.qpos[at + 2] = position[body], angle[body]
-            d.qvel[dof : dof + 2], d.qvel[dof + 2] = velocity[body], 0.0
+            d.qvel[dof : dof + 2], d.qvel[dof + 2] = velocity[body], spin[body]
+        self.table_physics.forget()
         if moved:
             for i in range(seats):
                 self._place_arm(i, position[i])
@@ -160,6 +167,7 @@ class Simulation:
         for puck in np.flatnonzero(self._out).tolist():
             dof = self.table_physics.dofs[puck]
             self.data.qvel[dof : dof + 3] = 0.0
+            self.table_physics.sliding.expected[puck] = np.nan
 
     def read(self, state: State, row: int) -> None:
         """Fill a row of a state of all worlds."""
@@ -187,6 +195,8 @@ class Simulation:
             "output": [array.copy() for array in self.output],
             "reference": self._reference.copy(),
             "out": self._out.copy(),
+            "expected": self.table_physics.sliding.expected.copy(),
+            "approach": self.table_physics.sliding.approach.copy(),
         }
 
     def restore(self, static: StaticScene, saved: dict[str, Any]) -> None:
@@ -199,3 +209,5 @@ class Simulation:
         for array, row in zip(self.output, saved["output"], strict=True):
             array[...] = row
         self._reference[:], self._out[:] = saved["reference"], saved["out"]
+        sliding = self.table_physics.sliding
+        sliding.expected[:], sliding.approach[:] = saved["expected"], saved["approach"]

@@ -16,7 +16,7 @@ from marl_airhockey.backends.robosuite.mujoco_c import (
 )
 from marl_airhockey.backends.robosuite.osc import subtract_payload, torques
 from marl_airhockey.backends.robosuite.reference import reference_motion
-from marl_airhockey.backends.robosuite.table_physics import apply_friction
+from marl_airhockey.backends.robosuite.sliding import apply_laws
 from marl_airhockey.types import Array
 
 RELEASE = 0.001
@@ -59,9 +59,8 @@ def advance(
             reference_motion(start[s], old[s], new[s], dt * substeps, dt * k, wanted)
             share = _command_arm(sim, static, s, wanted, mass, jacobian, rate)
             output.trace[k, s, 4] = share
-        speeds, forces = sim.qvel, sim.applied
-        movers = sim.movers[:, 1]
-        apply_friction(sim.coefficients, movers, static.pucks, speeds, forces, dt)
+        motion = sim.qpos, sim.qvel, sim.applied
+        apply_laws(sim.sliding, output.paddles, *motion, dt)
         step2(sim.model, sim.data)
         for s in range(seats):
             output.trace[k, s, 2] = sim.sensors[sim.arms[s, 5]]

@@ -141,7 +141,10 @@ function drawBodies(share) {
   });
   now.pucks.forEach((p, i) => {
     const o = old.pucks[i] || p, jump = far(o, p);
-    disc(jump ? p[0] : mix(o[0], p[0]), jump ? p[1] : mix(o[1], p[1]), match.puck_radius, inks.puck, alpha("#888888", 0.7));
+    const x = jump ? p[0] : mix(o[0], p[0]), y = jump ? p[1] : mix(o[1], p[1]), turn = mix(old.puck_angles[i], now.puck_angles[i]);
+    disc(x, y, match.puck_radius, inks.puck, alpha("#888888", 0.7));
+    const c = 0.55 * match.puck_radius * Math.cos(turn), s = 0.55 * match.puck_radius * Math.sin(turn); // a stripe shows how it spins
+    path([[x - c, y - s], [x + c, y + s]], false); pen.strokeStyle = alpha("#888888", 0.7); pen.stroke();
   });
   if (pointer && now.seat !== null) disc(pointer[0], pointer[1], 0.012, null, colour(now.seat));
 }
