@@ -37,10 +37,8 @@ PUCKS = {"pro": 0.0413, "wood": 0.03145}
 USUAL = {"pro": "professional", "wood": "wooden"}
 """Preset that belongs to each table."""
 OLD = {
-    "wall_restitution_slope": 0.0,
-    "wall_friction": 0.0,
-    "puck_drag": 0.0,
-    "tilt": 0.0,
+    **{"wall_restitution_slope": 0.0, "wall_friction": 0.0, "puck_drag": 0.0},
+    **{"puck_damping": 0.15, "wall_restitution": 0.9, "tilt": 0.0},
 }
 """Laws of before: linear drag, constant restitution, no friction and no spin."""
 BEST = {

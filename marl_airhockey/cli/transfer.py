@@ -22,6 +22,7 @@ from marl_airhockey.cli.options import (
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.physics import PARAMETERS, PROFILES, load_physics
+from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend, make_agent, make_scenario
 from marl_airhockey.world.build import Keywords
 
@@ -166,8 +167,16 @@ def _run(folder: Path, config: TrainConfig) -> str:
 
 def fit(
     scenario: Annotated[
-        str, typer.Argument(help="What is played; without blocks.")
+        str,
+        typer.Argument(
+            metavar="SCENARIO or FILE.csv...",
+            help="What is played, without blocks; or a file of rows t,x,y (s, m), "
+            "optionally with paddle_x,paddle_y, of a real table.",
+        ),
     ] = "juggle",
+    more: Annotated[
+        list[Path] | None, typer.Argument(hidden=True, help="Further files.")
+    ] = None,
     driver: Annotated[
         str | None, typer.Option(help="Who plays it; of the zoo unless given.")
     ] = None,
@@ -179,9 +188,20 @@ def fit(
     ] = None,
     steps: Annotated[int, typer.Option(help="Control steps of play.", min=1)] = 3000,
     seed: Annotated[int, typer.Option(help="Of the play.")] = 0,
+    table: Annotated[
+        str, typer.Option(help="Table of the rows, by name.")
+    ] = "standard",
+    origin: Annotated[
+        str, typer.Option(help="Of the rows: centre, or corner (of least x and y).")
+    ] = "centre",
     out: Annotated[Path, typer.Option(help="The preset.")] = Path("fit.toml"),
 ) -> None:
     """Fit the 2D table's physics to play on another one, for --physics FILE."""
+    if scenario.endswith(".csv"):
+        _fit_rows([Path(scenario), *(more or [])], table, origin, out)
+        return
+    if more:
+        raise ValueError(f"fit: {more[0]} follows a scenario; files must end in .csv")
     from marl_airhockey.transfer.recorded_play import load_recordings, record_play
     from marl_airhockey.transfer.system_id import fit_physics
 
@@ -197,14 +217,38 @@ def fit(
         found = fit_physics(seen)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(found.to_toml())
-    table = Table("", "usual values", "fitted", title=f"{found.segments} segments")
+    shown = Table("", "usual values", "fitted", title=f"{found.segments} segments")
     for name, value in found.physics.items():
         usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
-        table.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
+        shown.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
     for k, name in enumerate(("pucks off, mm", "paddles off, mm")):
         errors = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
-        table.add_row(name, *errors)
-    console.print(table)
+        shown.add_row(name, *errors)
+    console.print(shown)
     console.print(
         f"{found.error_reduction:.0%} of the pucks' error is gone; wrote {out}"
     )
+
+
+def _fit_rows(paths: list[Path], table: str, origin: str, out: Path) -> None:
+    """Fit a table's laws to files of rows, write them and print them."""
+    from marl_airhockey.transfer.table_fit import fit_table
+    from marl_airhockey.transfer.track import read_track
+
+    if table not in TABLES:
+        raise ValueError(unknown_name("table", table, TABLES))
+    with console.status("fitting"):
+        tracks = [read_track(path, TABLES[table], origin) for path in paths]
+        found = fit_table(tracks, TABLES[table])
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(found.to_toml())
+    shown = Table("", "fitted", "95 % interval", "flights or bounces", title=table)
+    rows = [(f"{n}, {PARAMETERS[n].unit}", e) for n, e in found.found.items()]
+    rows += [(f"wall_restitution, side {k}", e) for k, e in found.by_side.items()]
+    for label, e in rows:
+        interval = f"{e.low:.4g} .. {e.high:.4g}"
+        shown.add_row(label, f"{e.value:.4g}", interval, str(e.count))
+    for name, why in found.missing.items():
+        shown.add_row(name, "-", why, "")
+    console.print(shown)
+    console.print("wrote", out)
