@@ -221,6 +221,6 @@ def test_fair_opponents_act_late_and_slowly():
     at_once, fast = first_move(Handicap())
     late, slow = first_move(Handicap(reaction=0.2, pace=0.3))
     assert late - at_once == pytest.approx(0.2 * RATE, abs=1)
-    assert slow <= 0.3 * 2.5 + 1e-6 < fast
+    assert slow <= 0.3 * 5.0 + 1e-6 < fast
     with pytest.raises(ValueError, match="reaction"):
         Handicap(reaction=2.0)

@@ -134,7 +134,9 @@ def step_vector(env, k):
 
 
 def step_single(env, k):
-    seen, reward, *_ = env.step(np.full(2, np.sin(k), np.float32))
+    seen, reward, ended, *_ = env.step(np.full(2, np.sin(k), np.float32))
+    if ended:
+        seen, _ = env.reset()
     return [seen, reward]
 
 
