@@ -229,6 +229,6 @@ def test_options_reach_the_scenario(scenario, backend):
     for seats in ("robot", "arcade"):
         env = ah.parallel_env(scenario, backend=backend, seats=seats)
         env.reset(seed=0)
-        assert env.world.scene.seats[0].speed == {"robot": 0.7, "arcade": 2.5}[seats]
+        assert env.world.scene.seats[0].speed == {"robot": 0.7, "arcade": 5.0}[seats]
     short = ah.parallel_env(scenario, backend=backend, options={"seconds": 0.5})
     assert short.max_cycles == 10
