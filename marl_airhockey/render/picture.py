@@ -160,8 +160,8 @@ def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
         canvas.ring(position[k], radius[k] * 0.96, PUCK_RIM, 1)
         canvas.ring(position[k], radius[k] * 0.55, _pale(PUCK, 0.35), thin)
         # A stripe shows how it spins.
-        turn = float(state.angle[k])
-        arm = 0.55 * radius[k] * np.array([np.cos(turn), np.sin(turn)])
+        angle = float(state.angle[k])
+        arm = 0.55 * radius[k] * np.array([np.cos(angle), np.sin(angle)])
         canvas.line(position[k] - arm, position[k] + arm, _pale(PUCK, 0.35), thin)
 
 
