@@ -127,7 +127,10 @@ def demo(
         "runs/demo"
     ),
     scenario: Annotated[str, typer.Option(help="What to learn.")] = "juggle",
-    steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+    steps: Annotated[
+        int | None,
+        typer.Option(help="Steps of single worlds; the preset's, at most 2 M."),
+    ] = None,
 ) -> None:
     """Train a paddle to juggle, measure it, and show what it learned."""
     require("stable_baselines3", "train")

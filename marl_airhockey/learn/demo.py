@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
@@ -18,6 +19,9 @@ from marl_airhockey.toolkit.policies import load_policy
 
 BESIDE = ("still", "random", "striker")
 """Agents that the learned policy is compared with"""
+MOST_STEPS = 2_000_000
+"""Steps of training that a demonstration has unless told otherwise: juggling is learned
+in a quarter of them"""
 
 
 def run_demo(
@@ -31,7 +35,7 @@ def run_demo(
     Args:
         scenario: name of the task to learn.
         out: folder; an earlier demonstration in it is replaced.
-        steps: steps of single worlds; None for the preset's.
+        steps: steps of single worlds; None for the preset's, at most `MOST_STEPS`.
         report: called during training, see `train`.
 
     Returns:
@@ -40,8 +44,9 @@ def run_demo(
     folder = out / "run"
     if folder.exists():
         shutil.rmtree(folder)
-    changes = {} if steps is None else {"total_steps": steps}
-    last = train(preset(scenario, changes), folder, report)
+    config = preset(scenario)
+    steps = steps or min(config.total_steps, MOST_STEPS)
+    last = train(replace(config, total_steps=steps), folder, report)
     policy = load_policy(folder)
     drivers = {name: make_agent(name) for name in BESIDE} | {"learned": policy}
     results = [evaluate(d, name, scenario) for name, d in drivers.items()]
