@@ -124,8 +124,9 @@ def puck_gap(state: State) -> Array:
 def spin_of(rng: RandomStreams, speed: Array, radius: float) -> Array:
     """Draw spins (W,), rad/s, that play leaves on pucks of some speeds (W,), m/s.
 
-    The edge has up to 0.6 of the puck's speed: nine in ten did on a real table, after
-    a bounce.
+    The edge has up to 0.6 of the puck's speed. After a bounce, half of the pucks had at
+    most 0.09 and nine in ten 0.44 on a professional table, 0.59 and 0.83 on a wooden
+    one (the records of the documentation's page on physics).
     """
     return np.asarray(rng.uniform(-0.6, 0.6) * speed / radius)
 

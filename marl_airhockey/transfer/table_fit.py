@@ -9,7 +9,8 @@ determine is named with the reason, and not written.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -59,7 +60,6 @@ class FittedTable:
     """Restitution at 1 m/s by side of the table"""
     missing: dict[str, str]
     """Reasons why others are not identifiable, by name"""
-    notes: list[str] = field(default_factory=list)
 
     def to_toml(self) -> str:
         """Return physics for ``--physics FILE``."""
@@ -79,11 +79,7 @@ class FittedTable:
 
 
 def fit_table(tracks: list[Track], table: Table) -> FittedTable:
-    """Fit the laws of a table to tracks of its puck.
-
-    Raises:
-        ValueError: tracks without a flight or a bounce.
-    """
+    """Fit the laws of a table to tracks of its puck."""
     cuts = [cut(track, table) for track in tracks]
     flights = Flights(*(np.concatenate(x) for x in _columns(f for f, _ in cuts)))
     contacts = Contacts(*(np.concatenate(x) for x in _columns(c for _, c in cuts)))
@@ -102,17 +98,12 @@ def fit_table(tracks: list[Track], table: Table) -> FittedTable:
             for name in names:
                 missing[name] = f"not identifiable: {len(rows)} {what}, {FEWEST} needed"
             return
-        best = law(rows)
-        draws = np.array([law(rng.choice(rows, len(rows))) for _ in range(RESAMPLES)])
-        for i, name in enumerate(names):
-            low, high = np.quantile(draws[:, i], (0.025, 0.975))
-            estimate = Estimate(float(best[i]), float(low), float(high), len(rows))
-            if (high - low) / 2 > WIDEST[name]:
-                missing[name] = (
-                    f"not identifiable: {low:.3g} .. {high:.3g} from {len(rows)} {what}"
-                )
+        for name, e in zip(names, _estimates(rng, rows, law), strict=True):
+            if (e.high - e.low) / 2 > WIDEST[name]:
+                wide = f"{e.low:.3g} .. {e.high:.3g}"
+                missing[name] = f"not identifiable: {wide} from {e.count} {what}"
             else:
-                found[name] = estimate
+                found[name] = e
 
     long = np.flatnonzero(flights.seconds >= LONGEST)
     add(
@@ -136,28 +127,37 @@ def fit_table(tracks: list[Track], table: Table) -> FittedTable:
         for side in range(len(table.vertices)):
             rows = banks[contacts.side[banks] == side]
             if len(rows) >= FEWEST:
-                at_one = e[rows] + slope * np.log(contacts.before[rows, 0])
-                draws = [
-                    np.median(rng.choice(at_one, len(rows))) for _ in range(RESAMPLES)
-                ]
-                low, high = np.quantile(draws, (0.025, 0.975))
-                by_side[side] = Estimate(
-                    float(np.median(at_one)), float(low), float(high), len(rows)
-                )
+                at_one = e + slope * np.log(np.maximum(contacts.before[:, 0], 1e-9))
+                (by_side[side],) = _estimates(rng, rows, partial(_median, at_one))
     add(
         ("wall_friction",),
         _sliding(contacts, banks, e),
-        lambda rows: np.array([np.median(_rubbing(contacts, rows))]),
+        lambda rows: _median(_rubbing(contacts), rows),
         "bounces shallow enough to slide",
     )
     hits = np.flatnonzero(sound & (contacts.side < 0))
     add(
         ("paddle_restitution",),
         hits,
-        lambda rows: np.array([np.median(e[rows])]),
+        lambda rows: _median(e, rows),
         "hits of a recorded paddle (columns paddle_x, paddle_y)",
     )
     return FittedTable(found, by_side, missing)
+
+
+def _estimates(
+    rng: np.random.Generator, rows: Array, law: Callable[[Array], Array]
+) -> list[Estimate]:
+    """Return what a law makes of some rows, with intervals by a bootstrap over them."""
+    best = law(rows)
+    draws = np.array([law(rng.choice(rows, len(rows))) for _ in range(RESAMPLES)])
+    low, high = np.quantile(draws, (0.025, 0.975), axis=0)
+    numbers = zip(best.tolist(), low.tolist(), high.tolist(), strict=True)
+    return [Estimate(*row, len(rows)) for row in numbers]
+
+
+def _median(values: Array, rows: Array) -> Array:
+    return np.array([np.median(values[rows])])
 
 
 def _columns(parts: Iterable[Flights | Contacts]) -> Iterable[tuple[Array, ...]]:
@@ -176,17 +176,15 @@ def _flight_law(flights: Flights, rows: Array) -> Array:
         ]
     )
     # The curvature of a flight is known as its length to the power of 2.5.
-    weight = np.concatenate([t, t]) ** 2.5
-    wanted = a.T.ravel()
+    known = np.concatenate([t, t]) ** 2.5
+    wanted, weight = a.T.ravel(), known
     for _ in range(5):
         found, *_ = np.linalg.lstsq(
             matrix * weight[:, None], wanted * weight, rcond=None
         )
-        off = np.abs(matrix @ found - wanted) * np.concatenate([t, t]) ** 2.5
+        off = np.abs(matrix @ found - wanted) * known
         scale = 3.0 * max(float(np.median(off)), 1e-12)
-        weight = np.concatenate([t, t]) ** 2.5 * np.minimum(
-            1.0, scale / np.maximum(off, 1e-12)
-        )
+        weight = known * np.minimum(1.0, scale / np.maximum(off, 1e-12))
     angles = np.degrees(np.arcsin(np.clip(-found[1:] / GRAVITY, -1.0, 1.0)))
     return np.array([max(found[0], 0.0), *angles])
 
@@ -204,11 +202,11 @@ def _restitution_law(speed: Array, e: Array) -> Array:
     return found
 
 
-def _rubbing(contacts: Contacts, rows: Array) -> Array:
+def _rubbing(contacts: Contacts) -> Array:
     """Return the lost tangential speeds as shares of the normal impulses."""
-    before, after = contacts.before[rows], contacts.after[rows]
+    before, after = contacts.before, contacts.after
     lost = (before[:, 1] - after[:, 1]) * np.sign(before[:, 1])
-    return np.asarray(lost / (before[:, 0] + after[:, 0]))
+    return np.asarray(lost / np.maximum(before[:, 0] + after[:, 0], 1e-9))
 
 
 def _sliding(contacts: Contacts, banks: Array, e: Array) -> Array:
@@ -222,5 +220,5 @@ def _sliding(contacts: Contacts, banks: Array, e: Array) -> Array:
         rows = banks[np.abs(before[:, 1]) > SLIDES * needed + 0.2]
         if len(rows) < FEWEST:
             break
-        friction = max(float(np.median(_rubbing(contacts, rows))), friction)
+        friction = max(float(_median(_rubbing(contacts), rows)[0]), friction)
     return rows

@@ -224,7 +224,6 @@ def _contact(
     (place, before), (_, after) = one.at(time), two.at(time)
     depth = table.normals @ place + table.offsets - table.puck_radius
     near, side = float(depth.min()), int(depth.argmin())
-    still = np.zeros(2)
     if track.paddle is not None:
         rows = np.arange(one.rows[-1], two.rows[0] + 1)
         paddle = track.paddle[rows]
@@ -238,7 +237,7 @@ def _contact(
     if near > GAP or np.sort(depth)[1] < 2 * GAP:
         # Hits of a paddle that was not recorded, and corners.
         return None
-    return (side, *_split(table.normals[side], before - still, after - still))
+    return (side, *_split(table.normals[side], before, after))
 
 
 def _split(normal: Array, before: Array, after: Array) -> tuple[Array, Array]:

@@ -95,7 +95,6 @@ def overlap(scene, state):
 def press(world, seconds, aim=None, stop=None):
     """Chase pucks for some time, then rest; yield every state."""
     scene = world.scene
-    seats = range(len(scene.seats))
     steps = round(seconds / world.control_dt)
     for k in range(2 * steps):
         state = world.state
@@ -110,4 +109,3 @@ def press(world, seconds, aim=None, stop=None):
             action[:] = 0.0
         world.step(action)
         yield world.state
-    del seats
