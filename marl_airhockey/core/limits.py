@@ -112,9 +112,9 @@ def _limit(
         for _ in range(passes):
             for i in range(count):
                 nx, ny = normals[s, close[i], 0], normals[s, close[i], 1]
-                over = -(nx * x + ny * y) - fastest[i]
-                if over > 0.0:
-                    x, y = x + over * nx, y + over * ny
+                # Without a branch, which would be guessed wrong too often.
+                over = max(-(nx * x + ny * y) - fastest[i], 0.0)
+                x, y = x + over * nx, y + over * ny
         return x, y
 
     for b in range(action.shape[0]):

@@ -29,7 +29,7 @@ from marl_airhockey.backends.numba.arrays import (
 )
 from marl_airhockey.backends.numba.arrays import PUCK as PUCK_RESTITUTION
 from marl_airhockey.backends.numba.drift import drift, list_near, longest_drift
-from marl_airhockey.backends.numba.flight import clear_events, fly_freely
+from marl_airhockey.backends.numba.flight import block_space, fly_freely
 from marl_airhockey.backends.numba.geometry import (
     NEAR,
     RELEASE,
@@ -158,7 +158,8 @@ def advance(
     )
     batch = Batch(static, coefficients, commands, previous, result)
     busy = np.empty(len(coefficients), np.bool_)
-    if fly_freely(batch, busy):
+    blocked = block_space(paddles + pucks + blocks)
+    if fly_freely(batch, busy, blocked):
         _advance_busy(batch, busy, work, indices)
     for b in range(len(goal)):
         for i in range(paddles):
@@ -353,7 +354,6 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
     for b in range(len(coefficients)):
         if not busy[b]:
             continue
-        clear_events(batch, b)
         enter(b)
         keep_below_the_cap()
         world = m, role, coefficients[b], walls, obstacles, held, edges
