@@ -80,6 +80,12 @@ class Fused:
             self._refuse(error)
         return self.prepare(*sources)
 
+    def at(self, worlds: Array, *sources: Source) -> tuple[Sink, ...]:
+        """Return the sinks for some worlds (W,), by index, freshly allocated."""
+        if self._loop is not None:
+            sources = self._loop.needed(sources)
+        return self(*({k: _rows(v, worlds) for k, v in s.items()} for s in sources))
+
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
         """Return a stage that fills ``sinks`` from ``sources``, all kept by reference.
 
@@ -99,6 +105,10 @@ class Fused:
             RuntimeWarning,
             stacklevel=3,
         )
+
+
+def _rows(value: Any, worlds: Array) -> Any:
+    return value[worlds] if isinstance(value, np.ndarray) else value
 
 
 def _write(function: Function, sources: tuple[Source, ...], sinks: Any) -> None:
@@ -168,6 +178,13 @@ class _Loop:
             return module.call(kernel, outputs, *sources)  # type: ignore[no-any-return]
         except TypeError:
             return module.call(self._copying, outputs, *sources)  # type: ignore[no-any-return]
+
+    def needed(self, sources: tuple[Source, ...]) -> tuple[Source, ...]:
+        """Return the sources with only the arrays that the loop reads."""
+        kept: tuple[dict[str, Array], ...] = tuple({} for _ in sources)
+        for i, key in (self._counted, *self._inputs):
+            kept[i][key] = sources[i][key]
+        return kept
 
     def stage(self, sources: tuple[Source, ...], sinks: tuple[Sink, ...]) -> Stage:
         """Return a stage that fills ``sinks`` from ``sources``; see `Fused.stage`."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
 from marl_airhockey.core.physics import PARAMETERS
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
-from marl_airhockey.toolkit.starts import falling_puck, roll, spin_of
+from marl_airhockey.toolkit.starts import falling_puck, roll
 from marl_airhockey.types import Array
 
 STEP, STEPS = 0.005, 500
@@ -41,9 +40,7 @@ def legal_shots(rng: RandomStreams, scene: Scene) -> tuple[Array, Array]:
     for attempt in range(100 * TRIES):
         some = rng.select(open_rows)
         if attempt % TRIES == 0:
-            place, motion = falling_puck(some)
-            edge = spin_of(some, length(motion), 1.0)[:, None]
-            pucks[open_rows] = np.concatenate([place, motion, edge], -1)
+            pucks[open_rows] = falling_puck(some)
         goal, found = _shoot(some, pucks[open_rows], scene)
         goals[open_rows[found]] = goal[found]
         open_rows = open_rows[~found]

@@ -163,19 +163,19 @@ class Observer:
             return self.read(sensed, memory, seats)
         own = {name: array.copy() for name, array in shown.items()}
         observation = self.take(own, seats)
-        if served is None:
-            return observation
-        return self.renewed(observation, sensed, memory, seats, served)
+        if served is not None:
+            self.renew(observation, sensed, memory, seats, served)
+        return observation
 
-    def renewed(
+    def renew(
         self,
         observation: Observation,
         sensed: State,
         memory: Memory,
         seats: Array,
         worlds: Array,
-    ) -> Observation:
-        """Return a copy of an observation with that of some worlds read anew.
+    ) -> None:
+        """Read an observation anew in some worlds, in place.
 
         Args:
             observation: of all worlds.
@@ -184,13 +184,19 @@ class Observer:
             seats: (n,) indices of seats.
             worlds: (W,) indices.
         """
-        rows = sensed.map(lambda x: x[worlds])
-        kept = {name: array[worlds] for name, array in memory.items()}
-        fresh = self.read(rows, kept, seats, worlds=worlds)
+        fresh: Observation
+        if self.observe == "pixels":
+            kept = {name: array[worlds] for name, array in memory.items()}
+            fresh = self._pictures(kept, seats, worlds)
+        else:
+            sources = vars(sensed), memory, {"history": self.sensor.history}
+            (shown,) = self._shows[self.observe].at(worlds, *sources)
+            fresh = self.take(shown, seats)
         if isinstance(observation, np.ndarray):
-            return _merged(observation, worlds, np.asarray(fresh))
-        parts = dict(fresh)
-        return {k: _merged(v, worlds, parts[k]) for k, v in observation.items()}
+            observation[worlds] = fresh
+        else:
+            for name, array in observation.items():
+                array[worlds] = fresh[name]
 
     def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
         from marl_airhockey.world.pixels import small_picture
@@ -209,8 +215,8 @@ class Observer:
         return out
 
 
-def _merged(array: Array, worlds: Array, rows: Array) -> Array:
-    """Return a copy in which some worlds, by index, hold ``rows``."""
-    merged = array.copy()
-    merged[worlds] = rows
-    return merged
+def duplicate(observation: Observation) -> Observation:
+    """Return a copy of an observation, which shares no array with it."""
+    if isinstance(observation, np.ndarray):
+        return observation.copy()
+    return {name: array.copy() for name, array in observation.items()}

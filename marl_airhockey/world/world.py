@@ -18,7 +18,7 @@ from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.episode import Episode
-from marl_airhockey.world.observer import Observation, Observer
+from marl_airhockey.world.observer import Observation, Observer, duplicate
 from marl_airhockey.world.referee import Referee
 from marl_airhockey.world.sensor import Sensor
 from marl_airhockey.world.set_state import checked_memory, settled
@@ -258,10 +258,10 @@ class World:
         ended = result.terminated | result.truncated
         if self.autoreset and ended.any():
             worlds = np.flatnonzero(ended)
-            result.final_observation = result.observation
+            result.final_observation = duplicate(result.observation)
             self.reset_worlds(worlds)
             now = self._sensed, self._memory, self.open
-            result.observation = observer.renewed(result.observation, *now, worlds)
+            observer.renew(result.observation, *now, worlds)
 
     def close(self) -> None:
         """Close the backend and leave the drivers."""
