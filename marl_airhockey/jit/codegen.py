@@ -43,6 +43,8 @@ INFIX = {
     "bitwise_or": "|",
 }
 """Operations that numba compiles faster as operators."""
+COMPARED = {"maximum": "<", "minimum": ">"}
+"""Comparisons by which a known number takes the place of a symbol."""
 _loaded: dict[str, Loaded] = {}
 
 
@@ -131,6 +133,9 @@ class Writer:
         truths = all(_is_truth(a) for a in symbol.args)
         if op == "invert" and truths:
             return f"not {args[0]}"
+        if op in COMPARED and not isinstance(symbol.args[1], Symbol):
+            # As np.maximum and np.minimum, nan included, and faster.
+            return f"{args[1]} if {args[0]} {COMPARED[op]} {args[1]} else {args[0]}"
         if op in INFIX and not (truths and op in ("add", "multiply")):
             return f" {INFIX[op]} ".join(args)
         return f"np.{op}({', '.join(args)})"

@@ -105,8 +105,24 @@ def _clip(x: Any, low: Any, high: Any) -> Symbols:
 
 
 def _matmul(a: Any, b: Any) -> Any:
-    a, b = (np.asarray(x).astype(object).view(Symbols) for x in (a, b))
-    return (a[..., :, :, None] * b[..., None, :, :]).sum(-2)
+    """Multiply matrices without the terms of known zeros, of which rotations are full.
+
+    Where the other factor of such a term is infinite, numpy makes a nan of it.
+    """
+    a, b = (np.asarray(x).astype(object) for x in (a, b))
+    columns = np.swapaxes(b, -1, -2)[..., None, :, :]
+    left, right = np.broadcast_arrays(a[..., :, None, :], columns)
+    out = np.empty(left.shape[:-1], object)
+    for index in np.ndindex(out.shape):
+        pairs = zip(left[index], right[index], strict=True)
+        some = [p for p in pairs if not any(_is_zero(x) for x in p)]
+        terms = [_apply("multiply", np.multiply, x, y) for x, y in some]
+        out[index] = reduce(lambda x, y: _apply("add", np.add, x, y), terms or [0.0])
+    return out.view(Symbols)
+
+
+def _is_zero(scalar: Scalar) -> bool:
+    return not isinstance(scalar, Symbol) and bool(scalar == 0)
 
 
 def _zeros_like(a: Any) -> Array:

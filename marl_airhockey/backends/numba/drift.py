@@ -232,7 +232,7 @@ def drift(
     Returns:
         The length of the drift, s, and True if ``near`` must be listed again.
     """
-    stale = False
+    stale, most = False, h
     for attempt in range(REFINEMENTS):
         _move_freely(m, role, row, left, h)
         hits = False
@@ -247,13 +247,16 @@ def drift(
             stale, safe = True, 0.0
             longest = _longest_slide(m, pairs, contacts, n)
             if longest < h and attempt < REFINEMENTS - 1:
-                h = longest
+                h = most = longest
                 continue
             count = _list_near_drift(m, role, walls, obstacles, held, edges, h, near)
-        if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
+        if most <= safe or not sweeps or attempt == REFINEMENTS - 1:
             break
-        share = _first_touch(m, role, walls, obstacles, goal_lines, near, count, h)
-        if share >= 1.0:
+        chord = m, role, walls, obstacles, goal_lines, near, count, h
+        share = _first_touch(*chord, most / h)
+        # The chord to the touch is another one, so that it may come later, too. At the
+        # cap on speed, a body moves less than half of `TOUCH` in this time.
+        if abs(share - 1.0) * h < 4e-8:
             break
         h = max(h * share, 1e-9)
     for i in range(len(m)):
@@ -318,9 +321,12 @@ def _first_touch(
     near: Array,
     count: int,
     h: float,
+    first: float,
 ) -> float:
-    """Return the share of h s until two bodies touch or a puck crosses a goal line."""
-    first = 1.0
+    """Return the share of h s until two bodies touch or a puck crosses a goal line.
+
+    It is ``first`` where neither comes before.
+    """
     for k in range(count):
         i, j = near[k, 0], near[k, 1]
         if role[j] >= AWAY or (i >= 0 and role[i] >= AWAY):
