@@ -67,7 +67,9 @@ from marl_airhockey.types import Array
 BOW = 3e-4
 """Distance of a curved way from its chord that a drift may have (m)."""
 REFINEMENTS = 5
-"""Number of times that the first touch is looked for, each on a shorter chord."""
+"""Number of times that the first touch is looked for, each on another chord."""
+LATER = 1.1
+"""Share of a chord beyond its end that a touch is looked for."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -243,20 +245,26 @@ def drift(
         if hits:
             for c in range(n):
                 contacts[c, RESTITUTION] = contacts[c, FRICTION] = 0.0
-            solve(m, role, DX, pairs, contacts, visits, kept, n)
+            solve(m, role, np.int64(DX), pairs, contacts, visits, kept, n)
             stale, safe = True, 0.0
             longest = _longest_slide(m, pairs, contacts, n)
             if longest < h and attempt < REFINEMENTS - 1:
                 h = most = longest
                 continue
-            count = _list_near_drift(m, role, walls, obstacles, held, edges, h, near)
-        if most <= safe or not sweeps or attempt == REFINEMENTS - 1:
+            most, count = (
+                h,
+                _list_near_drift(m, role, walls, obstacles, held, edges, h, near),
+            )
+        if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
             break
+        # The chord to a touch is not the first one, so the touch may come later, too: a
+        # little, as the search does not converge for slow bodies, and not beyond what
+        # the pairs were listed for.
+        furthest = min(most / h, LATER)
         chord = m, role, walls, obstacles, goal_lines, near, count, h
-        share = _first_touch(*chord, most / h)
-        # The chord to the touch is another one, so that it may come later, too. At the
-        # cap on speed, a body moves less than half of `TOUCH` in this time.
-        if abs(share - 1.0) * h < 4e-8:
+        share = _first_touch(*chord, furthest)
+        # At the cap on speed, a body moves less than half of `TOUCH` in this time.
+        if share == furthest or abs(share - 1.0) * h < 4e-8:
             break
         h = max(h * share, 1e-9)
     for i in range(len(m)):
@@ -377,6 +385,6 @@ def _touch_fixed(
         gap -= m[j, RADIUS]
         slope = nx * x + ny * y
         if gap < 1e-9 or slope >= 0.0 or share >= most:
-            return share if gap < 1e-9 else 1.0
+            return share if gap < 1e-9 else np.inf
         share -= gap / slope
     return share

@@ -189,7 +189,7 @@ def solve(
         _stop_paddles_at_paddles(m, role, at, pairs, contacts, n)
     calm = at == DX and _rest(m, role, pairs, contacts, n)
     for _ in range(IMPACTS * n if at == VX else 0):
-        c = _hardest(m, role, at, pairs, contacts, n, 1)
+        c = _hardest(m, role, at, pairs, contacts, n, np.int64(1))
         if c < 0:
             calm = True
             break
@@ -252,7 +252,7 @@ def _stop_paddles_at_paddles(
 ) -> None:
     """Let paddles that meet share their normal velocity."""
     for _ in range(STOPS * n):
-        c = _hardest(m, role, at, pairs, contacts, n, 0)
+        c = _hardest(m, role, at, pairs, contacts, n, np.int64(0))
         if c < 0:
             return
         i, j = pairs[c, 0], pairs[c, 1]
@@ -274,7 +274,7 @@ def _stop_paddles(
     for c in range(n):
         visits[c] = 0
     for count in range(2 * STOPS * n):
-        c = _hardest(m, role, at, pairs, contacts, n, 2)
+        c = _hardest(m, role, at, pairs, contacts, n, np.int64(2))
         if c < 0:
             return
         i, j = pairs[c, 0], pairs[c, 1]

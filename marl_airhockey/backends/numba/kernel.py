@@ -358,17 +358,19 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
         keep_below_the_cap()
         world = m, role, coefficients[b], walls, obstacles, held, edges
         left, rounds, moment, count = control_dt, 0, 0, 0
-        stale, solved, bend = True, False, 0.0
+        # Nothing to be taken apart before the first drift.
+        stale, solved, apart, bend = True, False, True, 0.0
         while True:
             rounds += 1
             if stale:
                 count = list_near(*world, left, near)
                 bend, stale = longest_drift(m, role, near, count), False
-            n, hits, safe = 0, False, np.inf
+            n, hits, deep, safe = np.int64(0), False, False, np.inf
             for k in range(count):
                 i, j = near[k, 0], near[k, 1]
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
                 now = control_dt - left
+                deep |= gap < -1e-9 - slop(role, i, j)
                 if in_contact(gap, closing(m, VX, i, j, nx, ny)):
                     meet(b, i, j, now)
                     hits |= touch(b, n, i, j, nx, ny) < -TINY
@@ -383,8 +385,13 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                     if f >= 0 and role[i] == PUCK:
                         ahead = ahead_of_mouth(m[i, X], m[i, Y], walls, f)
                         safe = min(safe, max(ahead, 0.0) / max(m[i, REACH], 1e-9))
+            if deep and not apart:
+                take_apart(m, role, walls, obstacles, held, edges)
+                stale = apart = True
+                continue
             if hits and not solved:
-                solve(m, role, VX, pairs, contacts, visits, kept, n)
+                # np.int64, or numba compiles the function apart for each constant.
+                solve(m, role, np.int64(VX), pairs, contacts, visits, kept, n)
                 keep_below_the_cap()
                 stale = solved = True
                 continue
@@ -417,14 +424,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
             )
             left = left - h if left - h > 1e-12 else 0.0
             cross(b)
-            deep = False
-            for k in range(count):
-                i, j = near[k, 0], near[k, 1]
-                gap, _, _ = distance_between(m, i, j, walls, obstacles)
-                deep |= gap < -1e-9 - slop(role, i, j)
-            if deep:
-                take_apart(m, role, walls, obstacles, held, edges)
-                stale = True
+            apart = False
             if path.shape[1] > 0 and until - h < 1e-12:
                 if left > 0.0:
                     record(b, moment)
