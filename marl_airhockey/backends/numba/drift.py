@@ -58,6 +58,7 @@ from marl_airhockey.backends.numba.impacts import (
     closing,
     distance_between,
     fixed_range,
+    hide_constant,
     partner,
     solve,
 )
@@ -245,7 +246,7 @@ def drift(
         if hits:
             for c in range(n):
                 contacts[c, RESTITUTION] = contacts[c, FRICTION] = 0.0
-            solve(m, role, np.int64(DX), pairs, contacts, visits, kept, n)
+            solve(m, role, hide_constant(DX), pairs, contacts, visits, kept, n)
             stale, safe = True, 0.0
             longest = _longest_slide(m, pairs, contacts, n)
             if longest < h and attempt < REFINEMENTS - 1:

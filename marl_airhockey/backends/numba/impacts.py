@@ -49,6 +49,15 @@ MULTIPLE = 3.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def hide_constant(value: int) -> int:
+    """Return an integer that numba does not take for a constant.
+
+    It would compile a function apart for each constant that it is called with.
+    """
+    return int(np.int64(value))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def distance_between(
     m: Array, i: int, j: int, walls: Array, obstacles: Array
 ) -> tuple[float, float, float]:
@@ -189,7 +198,7 @@ def solve(
         _stop_paddles_at_paddles(m, role, at, pairs, contacts, n)
     calm = at == DX and _rest(m, role, pairs, contacts, n)
     for _ in range(IMPACTS * n if at == VX else 0):
-        c = _hardest(m, role, at, pairs, contacts, n, np.int64(1))
+        c = _hardest(m, role, at, pairs, contacts, n, hide_constant(1))
         if c < 0:
             calm = True
             break
@@ -252,7 +261,7 @@ def _stop_paddles_at_paddles(
 ) -> None:
     """Let paddles that meet share their normal velocity."""
     for _ in range(STOPS * n):
-        c = _hardest(m, role, at, pairs, contacts, n, np.int64(0))
+        c = _hardest(m, role, at, pairs, contacts, n, hide_constant(0))
         if c < 0:
             return
         i, j = pairs[c, 0], pairs[c, 1]
@@ -274,7 +283,7 @@ def _stop_paddles(
     for c in range(n):
         visits[c] = 0
     for count in range(2 * STOPS * n):
-        c = _hardest(m, role, at, pairs, contacts, n, np.int64(2))
+        c = _hardest(m, role, at, pairs, contacts, n, hide_constant(2))
         if c < 0:
             return
         i, j = pairs[c, 0], pairs[c, 1]

@@ -65,6 +65,7 @@ from marl_airhockey.backends.numba.impacts import (
     Y,
     closing,
     distance_between,
+    hide_constant,
     keep_in_reach,
     slop,
     solve,
@@ -365,7 +366,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
             if stale:
                 count = list_near(*world, left, near)
                 bend, stale = longest_drift(m, role, near, count), False
-            n, hits, deep, safe = np.int64(0), False, False, np.inf
+            n, hits, deep, safe = hide_constant(0), False, False, np.inf
             for k in range(count):
                 i, j = near[k, 0], near[k, 1]
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
@@ -390,8 +391,7 @@ def _advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> Non
                 stale = apart = True
                 continue
             if hits and not solved:
-                # np.int64, or numba compiles the function apart for each constant.
-                solve(m, role, np.int64(VX), pairs, contacts, visits, kept, n)
+                solve(m, role, hide_constant(VX), pairs, contacts, visits, kept, n)
                 keep_below_the_cap()
                 stale = solved = True
                 continue
