@@ -23,6 +23,7 @@ from marl_airhockey.backends.numba.geometry import (
     OUTSIDE,
     RELEASE,
     distance_to_fixed,
+    stays_in_reach,
 )
 from marl_airhockey.core.laws import cap, fly_slowed
 from marl_airhockey.jit.pipeline import view
@@ -35,10 +36,10 @@ ROWS = 9
 """Rows of a body: position (m); velocity at the end of the step (m/s); two points that
 its way lies between, from where it is (m); 1 for a paddle that asks for its velocity
 and for a puck in play, else 0."""
-DROP, ROOM, WITHIN, AHEAD = range(4)
+DROP, ROOM, AHEAD = range(3)
 """Rows after those of all bodies: fall of a body within the step (m); what is left of
-the room around all, below 0 if something may touch; room of a paddle in its reach at
-the start and at the end of the step (m)."""
+the room around all, below 0 if something may touch; least room of a paddle in its
+reach on its way (m)."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -174,20 +175,22 @@ def _find_room_in_reach(batch: Batch, count: int, m: Array) -> None:
     paddles, pucks, blocks, radius, walls = batch.static[:5]
     edges, last = batch.static.edges, paddles + pucks + blocks
     for i in range(paddles):
+        low, high = i * edges, (i + 1) * edges
         for c in range(count):
-            m[last, WITHIN, c] = m[last, AHEAD, c] = np.inf
-        for f in range(i * edges, (i + 1) * edges):
+            m[last, AHEAD, c] = np.inf
+        for f in range(low, high):
             nx, ny, offset = walls[f, 0], walls[f, 1], walls[f, 2] - radius[i]
             for c in range(count):
                 here = nx * m[i, X, c] + ny * m[i, Y, c] + offset
                 early = nx * m[i, EARLY_X, c] + ny * m[i, EARLY_Y, c]
                 late = nx * m[i, LATE_X, c] + ny * m[i, LATE_Y, c]
-                m[last, WITHIN, c] = min(m[last, WITHIN, c], here)
                 m[last, AHEAD, c] = min(m[last, AHEAD, c], here + min(early, late))
         for c in range(count):
-            leaves = m[last, WITHIN, c] > -OUTSIDE and m[last, AHEAD, c] <= -OUTSIDE
-            if leaves and m[i, FREE, c] > 0.0:
-                m[last, ROOM, c] = -1.0
+            if m[last, AHEAD, c] <= -OUTSIDE and m[i, FREE, c] > 0.0:
+                place, way = (m[i, X, c], m[i, Y, c]), (0.0, 0.0, 0.0, 0.0)
+                inside, _ = stays_in_reach(*place, way, walls, low, high, radius[i])
+                if inside:
+                    m[last, ROOM, c] = -1.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
