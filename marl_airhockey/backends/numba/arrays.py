@@ -12,7 +12,8 @@ from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
 
 PULL_X, PULL_Y, DAMPING, DRAG = range(4)
-WALL, WALL_SLOPE, WALL_MU, PADDLE, PADDLE_MU, PUCK, PUCK_MU, BLOCK = range(4, 12)
+WALL_E, WALL_SLOPE, WALL_MU, PADDLE_E, PADDLE_MU = range(4, 9)
+PUCK_E, PUCK_MU, BLOCK_E = range(9, 12)
 PUCK_MASS, BLOCK_MASS, BLOCK_GRIP, PULL, STEP_TIME = range(12, 17)
 COEFFICIENTS = 17
 """Columns of a world's coefficients: acceleration by the slope (m/s2), linear (1/s) and
