@@ -108,7 +108,8 @@ class Fused:
 
 
 def _rows(value: Any, worlds: Array) -> Any:
-    return value[worlds] if isinstance(value, np.ndarray) else value
+    # `take` is several times faster than an index.
+    return value.take(worlds, 0) if isinstance(value, np.ndarray) else value
 
 
 def _write(function: Function, sources: tuple[Source, ...], sinks: Any) -> None:

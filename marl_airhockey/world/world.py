@@ -248,8 +248,9 @@ class World:
         # count_nonzero: for few worlds, `any` costs as much as the physics.
         if serves is not None and np.count_nonzero(serves):
             served = np.flatnonzero(serves)
-            rows = self._state.map(lambda x: x[served])
-            memory = {name: array[served] for name, array in self._memory.items()}
+            # `take` is several times faster than an index.
+            rows = self._state.map(lambda x: x.take(served, 0))
+            memory = {name: x.take(served, 0) for name, x in self._memory.items()}
             rng = self._streams["serve"].select(served)
             self._place(served, *self.scenario.serve(rng, rows, memory))
             self._sense(served)
