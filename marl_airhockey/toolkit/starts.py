@@ -43,6 +43,7 @@ professional table, 0.59 and 0.83 on a wooden one (the records of the documentat
 page on physics).
 """
 FALLING = np.array([(0.4, 0.8), (-0.2, 0.2), (-1.0, -0.2), (-0.3, 0.3), (-SPIN, SPIN)])
+HOME = np.array([PADDLE_X, PADDLE_Y, *FALLING])
 
 
 def falling_puck(rng: RandomStreams) -> Array:
@@ -51,7 +52,11 @@ def falling_puck(rng: RandomStreams) -> Array:
     Returns:
         (W, 5) x, y, vx, vy, m, m/s, and speed of the edge by spin, m/s.
     """
-    puck = rng.uniform(FALLING[:, 0], FALLING[:, 1], 5)
+    return _spun(rng.uniform(FALLING[:, 0], FALLING[:, 1], 5))
+
+
+def _spun(puck: Array) -> Array:
+    """Multiply the last of five columns, a share of the puck's speed, by it."""
     puck[:, 4] *= length(puck[:, 2:4])
     return puck
 
@@ -61,8 +66,8 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
 
     No puck overlaps another.
     """
-    state = scene.still_state(len(rng))
-    state.position[:, 0] = uniform_box(rng, PADDLE_X, PADDLE_Y)
+    state, draws = scene.still_state(len(rng)), rng.uniform(HOME[:, 0], HOME[:, 1], 7)
+    state.position[:, 0], puck = draws[:, :2], _spun(draws[:, 2:])
     first, radius = scene.bodies.puck.start, scene.table.puck_radius
     for k in range(first, scene.bodies.puck.stop):
         others = state.position[:, first:k]
@@ -71,7 +76,8 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
             gap = np.linalg.norm(rows[:, None, :2] - others, axis=-1)
             return np.asarray((gap > 3 * radius).all(-1))
 
-        puck = falling_puck(rng) if k == first else redraw(rng, falling_puck, apart)
+        if k > first:
+            puck = redraw(rng, falling_puck, apart)
         state.position[:, k], state.velocity[:, k] = puck[:, :2], puck[:, 2:4]
         state.spin[:, k] = puck[:, 4] / radius
     return state

@@ -20,6 +20,7 @@ from marl_airhockey.backends.numba.bodies import (
     MASS,
     PINNED,
     PRESCRIBED,
+    PUCK,
     RADIUS,
     SPIN,
     VX,
@@ -131,6 +132,13 @@ def solve(
         kept: work space (N, 3).
         n: number of contacts.
     """
+    i, j = pairs[0, 0], pairs[0, 1]
+    if n == 1 and at == VX and i < 0 and role[j] == PUCK:
+        # Most often a puck meets a wall, which one impact settles.
+        nx, ny = contacts[0, NX], contacts[0, NY]
+        contact = nx, ny, contacts[0, RESTITUTION], contacts[0, FRICTION]
+        strike(m, at, i, j, contact, shares(m, role, i, j, False))
+        return
     top, paddle = 0.0, False
     for i in range(len(m)):
         kept[i, 0], kept[i, 1], kept[i, 2] = m[i, at], m[i, at + 1], m[i, SPIN]
