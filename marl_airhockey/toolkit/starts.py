@@ -43,7 +43,9 @@ professional table, 0.59 and 0.83 on a wooden one (the records of the documentat
 page on physics).
 """
 FALLING = np.array([(0.4, 0.8), (-0.2, 0.2), (-1.0, -0.2), (-0.3, 0.3), (-SPIN, SPIN)])
+"""Ranges of x, y (m), vx, vy (m/s) and `SPIN` of a puck that falls."""
 HOME = np.array([PADDLE_X, PADDLE_Y, *FALLING])
+"""The same behind those of x and y of the paddle (m)."""
 
 
 def falling_puck(rng: RandomStreams) -> Array:

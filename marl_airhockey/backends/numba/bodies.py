@@ -8,10 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from marl_airhockey.backends.numba.geometry import (
-    distance_to_fixed,
-    distance_to_point,
-)
+from marl_airhockey.backends.numba.geometry import distance_to_fixed, distance_to_point
 from marl_airhockey.types import Array
 
 X, Y, VX, VY, SPIN, ANGLE, RADIUS, MASS, EDGE = range(9)

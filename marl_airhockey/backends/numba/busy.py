@@ -49,9 +49,7 @@ from marl_airhockey.backends.numba.bodies import (
     hide_constant,
     slop,
 )
-from marl_airhockey.backends.numba.drift import (
-    drift,
-)
+from marl_airhockey.backends.numba.drift import drift
 from marl_airhockey.backends.numba.geometry import (
     NEAR,
     RELEASE,
@@ -67,14 +65,8 @@ from marl_airhockey.backends.numba.impacts import (
     TINY,
     solve,
 )
-from marl_airhockey.backends.numba.near import (
-    list_near,
-    longest_drift,
-)
-from marl_airhockey.backends.numba.overlaps import (
-    keep_in_reach,
-    take_apart,
-)
+from marl_airhockey.backends.numba.near import list_near, longest_drift
+from marl_airhockey.backends.numba.overlaps import keep_in_reach, take_apart
 from marl_airhockey.contracts.backend import PATIENCE
 from marl_airhockey.core.laws import cap, wall_restitution
 from marl_airhockey.jit.pipeline import view

@@ -52,17 +52,14 @@ from marl_airhockey.backends.numba.impacts import (
     TINY,
     solve,
 )
-from marl_airhockey.backends.numba.near import (
-    BOW,
-    list_near_drift,
-)
+from marl_airhockey.backends.numba.near import BOW, list_near_drift
 from marl_airhockey.core.laws import fly, slide
 from marl_airhockey.types import Array
 
 REFINEMENTS = 5
 """Number of times that the first touch is looked for, each on another chord."""
 LATER = 1.1
-"""Share of a chord beyond its end that a touch is looked for."""
+"""Share of a chord, a little beyond its end, up to which a touch is looked for."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

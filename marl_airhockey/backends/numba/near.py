@@ -27,9 +27,7 @@ from marl_airhockey.backends.numba.bodies import (
     fixed_range,
     partner,
 )
-from marl_airhockey.backends.numba.geometry import (
-    RELEASE,
-)
+from marl_airhockey.backends.numba.geometry import RELEASE
 from marl_airhockey.types import Array
 
 BOW = 3e-4

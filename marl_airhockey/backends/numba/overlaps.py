@@ -17,9 +17,7 @@ from marl_airhockey.backends.numba.bodies import (
     shares,
     slop,
 )
-from marl_airhockey.backends.numba.geometry import (
-    distance_to_fixed,
-)
+from marl_airhockey.backends.numba.geometry import distance_to_fixed
 from marl_airhockey.types import Array
 
 
