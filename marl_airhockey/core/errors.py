@@ -7,6 +7,16 @@ import importlib.util
 from collections.abc import Iterable
 
 
+class UnknownKeywordError(TypeError, ValueError):
+    """Unknown keyword: a TypeError, as in Python, and a ValueError, as bad input is."""
+
+
+def unknown_keyword(name: str, known: Iterable[object]) -> str:
+    """Return an error message, which holds the words that Python itself uses."""
+    rest = unknown_name("keyword", name, known)
+    return f"unexpected keyword argument {name!r}: {rest}"
+
+
 def require(module: str, extra: str) -> None:
     """Check that a module of an optional extra is installed.
 

@@ -56,7 +56,12 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         """Begin an episode; options as those of `AirHockeyEnv.reset`."""
         super().reset(seed=seed)
         observation, info = self.parallel.reset(seed, options)
-        return observation[self.agent], info[self.agent]
+        return observation[self.agent], self._named(info)
+
+    @property
+    def physics(self) -> dict[str, float]:
+        """Physical parameters of the episode by name."""
+        return self.parallel.physics
 
     def get_state(self) -> tuple[State, Memory]:
         """Return the true state and the scenario's memory, which `set_state` takes."""
@@ -70,9 +75,13 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         """Move by one control step; see `AirHockeyEnv` for the info."""
         seen, reward, ended, cut, info = self.parallel.step({self.agent: action})
         me = self.agent
+        return seen[me], reward[me], ended[me], cut[me], self._named(info)
+
+    def _named(self, infos: dict[str, dict[str, Any]]) -> dict[str, Any]:
+        info = infos[self.agent]
         # The name under which stable-baselines3 looks for it.
-        info[me]["is_success"] = info[me]["success"]
-        return seen[me], reward[me], ended[me], cut[me], info[me]
+        info["is_success"] = info["success"]
+        return info
 
     def render(self) -> Any:
         """Return a picture (H, W, 3) uint8 for "rgb_array"."""

@@ -1,7 +1,8 @@
-"""Gymnasium VectorEnv over B worlds: no dicts of agents, no copies in between."""
+"""Gymnasium VectorEnv: many worlds of a single-agent scenario, stepped as one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -11,6 +12,9 @@ from gymnasium.vector.utils import batch_space
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.state import State
 from marl_airhockey.envs.gymnasium_env import check_one_open
+from marl_airhockey.envs.infos import infos_of
+from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
+from marl_airhockey.envs.pictures import Pictures
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
@@ -20,40 +24,99 @@ from marl_airhockey.world.step_result import StepResult
 
 
 class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
-    """Worlds of a scenario with one open seat, which restart in the same step.
+    """B worlds with one open seat as a gymnasium ``VectorEnv``.
 
-    ``infos`` are dicts of arrays (B, ...). Where an episode ended, ``final_obs`` and
-    ``final_info`` hold its end, with the masks ``_final_obs`` and ``_final_info``.
+    ``infos`` are flat dicts of arrays (B, ...), with the same keys at reset and step;
+    see `infos.infos_of`.
 
     Args:
         scenario: its name, or a scenario object.
         num_envs: B.
+        autoreset_mode: when a world that ended begins anew. "NextStep", as is usual in
+            gymnasium: in the next step, which ignores its action. "SameStep": at once;
+            the observation and the infos of the end are ``final_obs`` and
+            ``final_info``, with the masks ``_final_obs`` and ``_final_info``.
+            "Disabled": by `reset` with a ``reset_mask``.
+        render_mode: None or "rgb_array": a picture of each world.
         **keywords: see `make.build_world`.
     """
 
+    metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium declares it so
+        "render_modes": ["rgb_array"],
+    }
+
     def __init__(
-        self, scenario: str | Scenario, num_envs: int = 1, **keywords: Unpack[Keywords]
+        self,
+        scenario: str | Scenario,
+        num_envs: int = 1,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        **keywords: Unpack[Keywords],
     ) -> None:
-        self.world = build_world(scenario, num_envs, autoreset=True, keywords=keywords)
+        self._mode = _mode_of(autoreset_mode)
+        same = self._mode is AutoresetMode.SAME_STEP
+        self.world = build_world(scenario, num_envs, autoreset=same, keywords=keywords)
         check_one_open(self.world)
-        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+        self._pictures = Pictures(self.world, render_mode)
+        fps = round(1 / self.world.control_dt)
+        self.metadata = {
+            **AirHockeyEnv.metadata,
+            **type(self).metadata,
+            "render_fps": fps,
+            "autoreset_mode": self._mode,
+        }
         self.num_envs = num_envs
-        self.render_mode = None
+        self.render_mode = render_mode
         self.single_observation_space = observation_space(self.world.observer)
         self.single_action_space = action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
+        self._ended = np.zeros(num_envs, np.bool_)
+
+    @property
+    def physics(self) -> dict[str, Array]:
+        """Physical parameters of the episodes by name, (B,); copies."""
+        physics = self.world.episode.physics
+        return {name: value.copy() for name, value in physics.items()}
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode in every world; world i gets seed + i.
+        """Begin an episode in every world.
 
-        Options as those of `AirHockeyEnv.reset`, with a row for each world.
+        Args:
+            seed: world i gets seed + i, or the i-th of B numbers.
+            options: as those of `AirHockeyEnv.reset`, with a row for each world, or
+                ``{"reset_mask": (B,) bool}``: the worlds that begin anew; all others go
+                on, and no seed may be given.
+
+        Raises:
+            ValueError: a bad seed, mask, option or state, named.
         """
-        if seed is not None and not isinstance(seed, (int, np.integer)):
-            raise ValueError("seed: give one number; world i gets seed + i")
-        return _rows(reset_world(self.world, seed, options)), {}
+        given = dict(options or {})
+        mask = given.pop("reset_mask", None)
+        if mask is not None:
+            return self._reset_some(np.asarray(mask), seed), self._infos()
+        self._ended[:] = False
+        observation = _rows(reset_world(self.world, seed, given))
+        self._pictures.follow(range(self.num_envs))
+        return observation, self._infos()
+
+    def _reset_some(self, mask: Array, seed: object) -> Any:
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise ValueError(
+                f"reset_mask: expected {self.num_envs} bools, at least one of them True"
+            )
+        if seed is not None:
+            raise ValueError("seed: leave it out beside a reset_mask")
+        self._ended[mask] = False
+        worlds = np.flatnonzero(mask)
+        self.world.reset_worlds(worlds)
+        self._pictures.follow(worlds)
+        return _rows(self.world.observation())
 
     def get_state(self) -> tuple[State, Memory]:
         """Return the true states and the memories of all worlds, (B, ...)."""
@@ -63,37 +126,73 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
     ) -> Any:
         """Go on from given states, see `World.set_state`; return the observations."""
+        self._ended[slice(None) if worlds is None else worlds] = False
         return _rows(self.world.set_state(state, memory, worlds))
 
     def step(self, actions: Array) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
-        """Move all worlds by one control step; actions (B, 2)."""
+        """Move all worlds by one control step; actions (B, 2).
+
+        Raises:
+            RuntimeError: with "Disabled", an episode has ended and was not reset.
+        """
+        if self._ended.any() and self._mode is AutoresetMode.DISABLED:
+            raise RuntimeError(
+                "step: episodes have ended; call "
+                'reset(options={"reset_mask": terminated | truncated}) first'
+            )
         result = self.world.step(np.asarray(actions)[:, None])
-        info = self._info(result)
+        begun = np.flatnonzero(self._ended)
+        if len(begun):
+            self._begin_anew(begun, result)
+        ended = result.terminated | result.truncated
+        infos = self._infos(result)
         if result.final_observation is not None:
-            done = result.terminated | result.truncated
-            info["final_obs"] = _rows(result.final_observation)
-            info["_final_obs"] = info["_final_info"] = done
-            info["final_info"] = self._info(result)
+            final = self._infos(result)
+            infos["final_obs"] = _rows(result.final_observation)
+            infos["_final_obs"] = infos["_final_info"] = ended
+            infos["final_info"] = final
+            begun = np.flatnonzero(ended)
+        self._pictures.follow(begun)
+        if self._mode is not AutoresetMode.SAME_STEP:
+            self._ended[:] = ended
         return (
             _rows(result.observation),
             result.reward[:, 0],
             result.terminated,
             result.truncated,
-            info,
+            infos,
         )
 
-    @staticmethod
-    def _info(result: StepResult) -> dict[str, Any]:
-        return {
-            "reward": {name: term[:, 0] for name, term in result.terms.items()},
-            "applied_action": result.applied_action[:, 0],
-            "success": result.success[:, 0],
-            "cost": result.cost[:, 0],
-        }
+    def _begin_anew(self, worlds: Array, result: StepResult) -> None:
+        """Let worlds that ended in the step before begin; their step is none."""
+        self.world.reset_worlds(worlds)
+        result.clear(worlds)
+        result.observation = self.world.observation()
+
+    def _infos(self, result: StepResult | None = None) -> dict[str, Any]:
+        result = result or self.world.no_step()
+        return dict(infos_of(result, self.world, self.world.alive[:, 0]))
+
+    def render(self) -> tuple[Array, ...]:
+        """Return a picture (H, W, 3) uint8 of each world."""
+        return tuple(self._pictures.take())
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the physics."""
         self.world.close()
+
+
+def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
+    """Return the mode of a name, "SameStep", "NextStep" or "Disabled"."""
+    modes = {m.value: m for m in AutoresetMode}
+    names = [*modes, *(m.name for m in AutoresetMode)]
+    if isinstance(mode, AutoresetMode):
+        return mode
+    if mode in AutoresetMode.__members__:
+        return AutoresetMode[mode]
+    if mode in modes:
+        return modes[mode]
+    raise ValueError(f"autoreset_mode: {mode!r}; there are: {', '.join(names)}")
 
 
 def _rows(observation: Observation) -> Any:

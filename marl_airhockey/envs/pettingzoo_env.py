@@ -9,8 +9,8 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.limits import VIOLATIONS
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.spaces import (
     action_space,
@@ -31,17 +31,11 @@ Dicts = tuple[
 ]
 
 
-CONSTRAINTS = tuple(enumerate(VIOLATIONS[:-1]))
-"""Limits and their columns of `violation`; the last of all is the cost."""
-
-
 class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """World of a scenario whose open seats are the agents, ``paddle_0`` and so on.
 
-    All agents stay to the end of the episode and end together. ``info`` of an agent
-    holds ``reward`` (terms by name), ``applied_action``, ``success`` (latched),
-    ``constraints`` and ``cost`` (excess of the action over the limits); that of a reset
-    holds the ``physics`` of the episode.
+    All agents stay to the end of the episode and end together. The info of an agent
+    is flat and has the same keys at reset and step, see `infos.info_of`.
 
     It can be copied and pickled at any moment, and the copy goes on by itself; an open
     window is left behind.
@@ -147,9 +141,13 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             self.np_random = np.random.default_rng(seed)
         observation = reset_world(self.world, seed, options)
         self.agents = self.possible_agents[:]
-        physics = {k: float(v[0]) for k, v in self.world.episode.physics.items()}
         self._begin_pictures()
-        return self._dict(observation), {a: {"physics": physics} for a in self.agents}
+        return self._dict(observation), self._infos(self.world.no_step())
+
+    @property
+    def physics(self) -> dict[str, float]:
+        """Physical parameters of the episode by name."""
+        return {k: float(v[0]) for k, v in self.world.episode.physics.items()}
 
     def get_state(self) -> tuple[State, Memory]:
         """Return the true state and the scenario's memory, which `set_state` takes.
@@ -193,7 +191,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             {agent: reward.item(i) for i, agent in enumerate(agents)},
             dict.fromkeys(agents, terminated),
             dict.fromkeys(agents, truncated),
-            {agent: self._info(result, i) for i, agent in enumerate(agents)},
+            self._infos(result),
         )
         if terminated or truncated:
             self.agents = []
@@ -229,15 +227,10 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             return {a: {k: v[0, i] for k, v in observation.items()} for i, a in agents}
         return {a: observation[0, i] for i, a in agents}
 
-    def _info(self, result: StepResult, i: int) -> dict[str, Any]:
-        violation = result.violation[0, self.world.open[i]].tolist()
-        return {
-            "reward": {k: v.item(i) for k, v in result.terms.items()},
-            "applied_action": result.applied_action[0, i],
-            "success": result.success.item(i),
-            "constraints": {name: violation[k] for k, name in CONSTRAINTS},
-            "cost": violation[-1],
-        }
+    def _infos(self, result: StepResult) -> dict[str, dict[str, Any]]:
+        world, agents = self.world, enumerate(self.agents)
+        alive = world.alive[0].tolist()
+        return {a: info_of(result, world, i, alive[i]) for i, a in agents}
 
     def state(self) -> Array:
         """Return the true state of everything, table frame, as flat numbers."""

@@ -18,5 +18,6 @@ def register_all() -> None:
         register(
             id=gymnasium_id(name),
             entry_point="marl_airhockey.envs.gymnasium_env:make_single",
+            vector_entry_point="marl_airhockey.envs.gymnasium_vec_env:AirHockeyVectorEnv",
             kwargs={"scenario": name},
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -13,7 +14,7 @@ OPTIONS = ("state", "memory")
 
 
 def reset_world(
-    world: World, seed: int | None, options: dict[str, Any] | None
+    world: World, seed: int | Sequence[int] | None, options: dict[str, Any] | None
 ) -> Observation:
     """Reset worlds, to given states if the options hold them.
 

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.pictures import Pictures
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
@@ -27,6 +28,7 @@ class AirHockeyVecEnv(VecEnv):
     Args:
         scenario: its name, or a scenario object.
         num_worlds: B.
+        render_mode: None or "rgb_array": pictures of all worlds, tiled.
         **keywords: see `make.build_world`.
     """
 
@@ -34,11 +36,13 @@ class AirHockeyVecEnv(VecEnv):
         self,
         scenario: str | Scenario,
         num_worlds: int = 1,
+        render_mode: str | None = None,
         **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, num_worlds, True, keywords)
         self.seats = len(self.world.open)
-        self.render_mode = None
+        self.render_mode = render_mode
+        self._pictures = Pictures(self.world, render_mode)
         self.last_terms: dict[str, float] = {}
         """Mean reward terms of the last step, by name."""
         self._began = time.time()
@@ -47,6 +51,8 @@ class AirHockeyVecEnv(VecEnv):
         self._returns, self._lengths = np.zeros(slots), np.zeros(slots, np.int64)
         self._actions = np.zeros((num_worlds, self.seats, 2))
         super().__init__(slots, observation_space(self.world.observer), action_space())
+        fps: Any = round(1 / self.world.control_dt)
+        self.metadata["render_fps"] = fps
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Give world i the seed + i at the next reset."""
@@ -57,7 +63,9 @@ class AirHockeyVecEnv(VecEnv):
     def reset(self) -> Any:
         """Begin an episode in every world."""
         self._returns[:], self._lengths[:] = 0.0, 0
-        return self._slots(self.world.reset())
+        observation = self._slots(self.world.reset())
+        self._pictures.follow(range(self.world.num_worlds))
+        return observation
 
     def get_state(self) -> tuple[State, Memory]:
         """Return the true states and the memories of all worlds, (B, ...)."""
@@ -100,6 +108,7 @@ class AirHockeyVecEnv(VecEnv):
                 }
             self._returns[done], self._lengths[done] = 0.0, 0
             self._restarted(np.flatnonzero(ended), result)
+        self._pictures.follow(np.flatnonzero(ended))
         return self._slots(result.observation), reward, done, infos
 
     def _slots(self, observation: Observation) -> Any:
@@ -127,6 +136,10 @@ class AirHockeyVecEnv(VecEnv):
         scenario = self.world.scenario
         assert isinstance(scenario, GoalScenario)
         return np.asarray(scenario.goal_reward(achieved, desired), np.float32)
+
+    def get_images(self) -> Sequence[Array | None]:
+        """Return a picture (H, W, 3) uint8 of each world."""
+        return self._pictures.take()
 
     def close(self) -> None:
         """Close the physics."""

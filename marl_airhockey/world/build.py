@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any, TypedDict
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.errors import (
+    UnknownKeywordError,
+    unknown_keyword,
+    unknown_name,
+)
 from marl_airhockey.core.physics import Given, Physics
 from marl_airhockey.jit.threads import threads
 from marl_airhockey.registry import (
@@ -68,13 +72,14 @@ def build_world(
             options: the scenario's own fields.
 
     Raises:
+        UnknownKeywordError: a keyword that is none of these; TypeError and ValueError.
         ValueError: an unknown name or a value that makes no sense, named.
         RuntimeError: a backend that cannot run here, with the fix.
     """
     for name in keywords:
         if name not in Keywords.__annotations__:
-            raise ValueError(
-                unknown_name("keyword", name, Keywords.__annotations__)
+            raise UnknownKeywordError(
+                unknown_keyword(name, Keywords.__annotations__)
                 + "; fields of the scenario go into options={...}"
             )
     threads()  # Refused here if it makes no sense, not at the first step.

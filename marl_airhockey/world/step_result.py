@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from marl_airhockey.types import Array
 from marl_airhockey.world.control_step import Moment
 from marl_airhockey.world.observer import Observation
@@ -64,3 +66,9 @@ class StepResult:
             success=own[3],
             first_shot=moment.episode.first_shot.copy(),
         )
+
+    def clear(self, worlds: Array | slice = slice(None)) -> None:
+        """Make it the result of no step in some worlds, by index: all 0."""
+        numbers = [v for v in vars(self).values() if isinstance(v, np.ndarray)]
+        for array in (*numbers, *self.terms.values()):
+            array[worlds] = 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -123,19 +123,40 @@ class World:
             raise RuntimeError("step: call reset() first; no episode is running")
         return self._step
 
-    def seed(self, seed: int | None = None) -> None:
-        """Give world i the seed + i at the next `reset`; None draws from the system."""
+    @property
+    def alive(self) -> Array:
+        """(B, open) bool: True for open seats that still play."""
+        retired = self.scenario.retired(self._memory)
+        if retired is None:
+            return np.ones((self.num_worlds, len(self.open)), np.bool_)
+        return np.asarray(~retired[:, self.open])
+
+    def seed(self, seed: int | Sequence[int] | None = None) -> None:
+        """Set the seeds of the worlds from the next `reset` on.
+
+        Args:
+            seed: world i gets seed + i, or the i-th of B numbers; None draws one from
+                the system.
+
+        Raises:
+            ValueError: not one number for each world.
+        """
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
-        self.seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
+        if isinstance(seed, Sequence):
+            if len(seed) != self.num_worlds:
+                raise ValueError(f"seed: {len(seed)} for {self.num_worlds} worlds")
+            self.seeds = np.array(seed, np.int64)
+        else:
+            self.seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
         self._episode.number[:] = 0
         self._seeded = True
 
-    def reset(self, seed: int | None = None) -> Observation:
+    def reset(self, seed: int | Sequence[int] | None = None) -> Observation:
         """Begin a new episode everywhere and return the first observation.
 
         Args:
-            seed: world i gets seed + i; None goes on with the streams there are.
+            seed: see `seed`; None goes on with the streams there are.
         """
         if seed is not None or not self._seeded:
             self.seed(seed)
@@ -239,6 +260,12 @@ class World:
         self._adopt(moment)
         result = StepResult.of(moment, self.open if self.driven else None)
         self._finish_step(moment, result)
+        return result
+
+    def no_step(self) -> StepResult:
+        """Return the result of no step: all 0, without observation."""
+        result = StepResult.of(self._built.now, self.open if self.driven else None)
+        result.clear()
         return result
 
     def _finish_step(self, moment: Moment, result: StepResult) -> None:

@@ -83,12 +83,12 @@ def test_every_parameter_takes_a_value_and_a_range(name):
     parameter = PARAMETERS[name]
     value = min(max(parameter.default, parameter.low), parameter.high)
     env = ah.parallel_env("touch", physics={name: value})
-    _, info = env.reset(seed=0)
-    assert info["paddle_0"]["physics"][name] == pytest.approx(value)
+    env.reset(seed=0)
+    assert env.physics[name] == pytest.approx(value)
     high = min(value + 0.01 * (parameter.high - parameter.low), parameter.high)
     env = ah.parallel_env("touch", physics={name: (value, high)})
-    _, info = env.reset(seed=0)
-    assert value <= info["paddle_0"]["physics"][name] <= high
+    env.reset(seed=0)
+    assert value <= env.physics[name] <= high
     env.step(GOOD)
 
 

@@ -54,7 +54,7 @@ def test_the_end_of_an_episode_is_that_of_a_world_that_does_not_restart():
 
 
 def test_gymnasium_vector_environment_restarts_in_the_same_step():
-    envs = ah.make_vec("touch", 16, max_cycles=30)
+    envs = ah.make_vec("touch", 16, autoreset_mode="SameStep", max_cycles=30)
     assert envs.metadata["autoreset_mode"] == gymnasium.vector.AutoresetMode.SAME_STEP
     seen, _ = envs.reset(seed=1)
     assert seen.shape == (16, *envs.single_observation_space.shape)

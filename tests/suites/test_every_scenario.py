@@ -207,7 +207,9 @@ def test_rewards_are_the_sum_of_their_terms(scenario, backend):
             {a: np.ones(2, np.float32) for a in env.agents}
         )
         for agent, value in reward.items():
-            assert value == pytest.approx(sum(info[agent]["reward"].values()))
+            assert value == pytest.approx(
+                sum(v for k, v in info[agent].items() if k.startswith("reward/"))
+            )
         if not env.agents:
             break
 

@@ -1,0 +1,63 @@
+"""Infos: numbers beside observation and reward, with the same keys at every call.
+
+They are flat, as most clients of PettingZoo and gymnasium expect.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from marl_airhockey.core.limits import VIOLATIONS
+from marl_airhockey.types import Array
+from marl_airhockey.world.step_result import StepResult
+from marl_airhockey.world.world import World
+
+CONSTRAINTS = tuple(f"constraint/{name}" for name in VIOLATIONS[:-1])
+"""Keys of the excess of an action over each limit, in the order of `VIOLATIONS`."""
+
+
+def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, Any]:
+    """Return the info of an open seat of the only world.
+
+    Keys: ``applied_action`` (2,), ``success`` (latched), ``first_shot``, ``alive``,
+    ``cost``, ``constraint/speed`` and so on, and ``reward/<term>``.
+
+    Args:
+        result: of a step of one world.
+        world: the world.
+        i: index among the open seats.
+        alive: whether the seat still plays.
+    """
+    violation = result.violation[0, world.open[i]].tolist()
+    info = {
+        "applied_action": result.applied_action[0, i],
+        "success": result.success.item(i),
+        "first_shot": result.first_shot.item(0),
+        "alive": alive,
+        "cost": violation[-1],
+        **dict(zip(CONSTRAINTS, violation, strict=False)),
+    }
+    for name, term in result.terms.items():
+        info[f"reward/{name}"] = term.item(i)
+    return info
+
+
+def infos_of(result: StepResult, world: World, alive: Array) -> dict[str, Array]:
+    """Return the infos of the only open seat of B worlds, arrays (B, ...).
+
+    Args:
+        result: of a step.
+        world: the worlds.
+        alive: (B,) bool: whether the seat still plays.
+    """
+    violation = result.violation[:, world.open[0]]
+    columns = {name: violation[:, k] for k, name in enumerate(CONSTRAINTS)}
+    return {
+        "applied_action": result.applied_action[:, 0],
+        "success": result.success[:, 0],
+        "first_shot": result.first_shot,
+        "alive": alive,
+        "cost": result.cost[:, 0],
+        **columns,
+        **{f"reward/{name}": term[:, 0] for name, term in result.terms.items()},
+    }

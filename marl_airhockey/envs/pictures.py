@@ -1,0 +1,57 @@
+"""Pictures of the worlds of a batch, for vector environments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.types import Array
+from marl_airhockey.world.world import World
+
+if TYPE_CHECKING:
+    from marl_airhockey.render.renderer import Renderer
+
+
+class Pictures:
+    """Renderers of all worlds of a batch, or none.
+
+    Args:
+        world: the worlds; read, not changed.
+        render_mode: None or "rgb_array".
+
+    Raises:
+        ValueError: another mode.
+    """
+
+    def __init__(self, world: World, render_mode: str | None) -> None:
+        self._renderers: list[Renderer] = []
+        if render_mode is None:
+            return
+        if render_mode != "rgb_array":
+            what = "render_mode of a batch"
+            raise ValueError(unknown_name(what, render_mode, (None, "rgb_array")))
+        from marl_airhockey.render.renderer import Renderer
+
+        title = world.scenario.name.replace("_", " ")
+        mode, rows = render_mode, range(world.num_worlds)
+        self._renderers = [Renderer(world, mode, title, index=i) for i in rows]
+
+    def follow(self, begun: Iterable[int] = ()) -> None:
+        """Follow a reset or a step, after which some worlds, by index, are new."""
+        if not self._renderers:
+            return
+        for i in begun:
+            self._renderers[i].begin()
+        for renderer in self._renderers:
+            renderer.follow()
+
+    def take(self) -> list[Array]:
+        """Return a picture (H, W, 3) uint8 of each world.
+
+        Raises:
+            RuntimeError: built without a render mode, or before the first reset.
+        """
+        if not self._renderers:
+            raise RuntimeError('render: build it with render_mode="rgb_array"')
+        return [picture for r in self._renderers if (picture := r.show()) is not None]
