@@ -171,7 +171,12 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
 
     def _infos(self, result: StepResult | None = None) -> dict[str, Any]:
         result = result or self.world.no_step()
-        return dict(infos_of(result, self.world, self.world.alive[:, 0]))
+        retired = self.world.retired
+        if retired is None:
+            alive = np.ones(self.num_envs, np.bool_)
+        else:
+            alive = ~retired[:, self.world.open[0]]
+        return dict(infos_of(result, self.world, alive))
 
     def render(self) -> tuple[Array, ...]:
         """Return a picture (H, W, 3) uint8 of each world."""

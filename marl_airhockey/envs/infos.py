@@ -5,6 +5,7 @@ They are flat, as most clients of PettingZoo and gymnasium expect.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from marl_airhockey.core.limits import VIOLATIONS
@@ -14,6 +15,12 @@ from marl_airhockey.world.world import World
 
 CONSTRAINTS = tuple(f"constraint/{name}" for name in VIOLATIONS[:-1])
 """Keys of the excess of an action over each limit, in the order of `VIOLATIONS`."""
+_SPEED, _ACCELERATION, _JERK, _REACH = CONSTRAINTS
+
+
+@cache
+def _term(name: str) -> str:
+    return f"reward/{name}"
 
 
 def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, Any]:
@@ -28,17 +35,22 @@ def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, 
         i: index among the open seats.
         alive: whether the seat still plays.
     """
-    violation = result.violation[0, world.open[i]].tolist()
+    rows = result.violation[0, world.open[i]].tolist()
+    speed, acceleration, jerk, reach, cost = rows
+    # A dict display: this is a good part of the price of a step.
     info = {
         "applied_action": result.applied_action[0, i],
         "success": result.success.item(i),
         "first_shot": result.first_shot.item(0),
         "alive": alive,
-        "cost": violation[-1],
-        **dict(zip(CONSTRAINTS, violation, strict=False)),
+        "cost": cost,
+        _SPEED: speed,
+        _ACCELERATION: acceleration,
+        _JERK: jerk,
+        _REACH: reach,
     }
     for name, term in result.terms.items():
-        info[f"reward/{name}"] = term.item(i)
+        info[_term(name)] = term.item(i)
     return info
 
 
@@ -59,5 +71,5 @@ def infos_of(result: StepResult, world: World, alive: Array) -> dict[str, Array]
         "alive": alive,
         "cost": result.cost[:, 0],
         **columns,
-        **{f"reward/{name}": term[:, 0] for name, term in result.terms.items()},
+        **{_term(name): term[:, 0] for name, term in result.terms.items()},
     }

@@ -228,9 +228,12 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         return {a: observation[0, i] for i, a in agents}
 
     def _infos(self, result: StepResult) -> dict[str, dict[str, Any]]:
-        world, agents = self.world, enumerate(self.agents)
-        alive = world.alive[0].tolist()
-        return {a: info_of(result, world, i, alive[i]) for i, a in agents}
+        world, retired = self.world, self.world.retired
+        out = [] if retired is None else retired[0, world.open].tolist()
+        return {
+            agent: info_of(result, world, i, not (out and out[i]))
+            for i, agent in enumerate(self.agents)
+        }
 
     def state(self) -> Array:
         """Return the true state of everything, table frame, as flat numbers."""

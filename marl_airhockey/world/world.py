@@ -124,12 +124,9 @@ class World:
         return self._step
 
     @property
-    def alive(self) -> Array:
-        """(B, open) bool: True for open seats that still play."""
-        retired = self.scenario.retired(self._memory)
-        if retired is None:
-            return np.ones((self.num_worlds, len(self.open)), np.bool_)
-        return np.asarray(~retired[:, self.open])
+    def retired(self) -> Array | None:
+        """(B, seats) bool: True for seats that have left the game; None if none can."""
+        return self.scenario.retired(self._memory)
 
     def seed(self, seed: int | Sequence[int] | None = None) -> None:
         """Set the seeds of the worlds from the next `reset` on.
