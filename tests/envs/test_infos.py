@@ -125,3 +125,9 @@ def test_an_unknown_keyword_is_an_error_in_the_words_of_python():
         ah.make_vec("juggle", autoreset_mode="never")
     with pytest.raises(ValueError, match="seed: 2 for 3 worlds"):
         ah.make_vec("juggle", 3).reset(seed=[1, 2])
+
+
+def test_torchrl_takes_every_scenario_as_it_is(scenario):
+    pettingzoo = pytest.importorskip("torchrl.envs.libs.pettingzoo")
+    utils = pytest.importorskip("torchrl.envs.utils")
+    utils.check_env_specs(pettingzoo.PettingZooWrapper(ah.parallel_env(scenario)))
