@@ -31,24 +31,25 @@ def _mix(z: Any) -> Any:
 
 @njit(cache=True)
 def _begin(
-    keys: Array, counts: Array, rows: Array, seeds: Array, episodes: Array, salt: int
+    keys: Array, counts: Array, rows: Array, seeds: Array, episodes: Array, salts: Array
 ) -> None:
     for row in rows:
         world = _mix(np.uint64(seeds[row]) * _GOLDEN + _GOLDEN)
-        episode = _mix(np.uint64(episodes[row]) * _GOLDEN + np.uint64(salt))
-        keys[row] = _mix(world ^ episode)
-        counts[row] = 0
+        for k in range(len(salts)):
+            episode = _mix(np.uint64(episodes[row]) * _GOLDEN + salts[k])
+            keys[k, row] = _mix(world ^ episode)
+            counts[k, row] = 0
 
 
 @njit(cache=True)
 def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
     """Fill ``out`` (W, n) with numbers in [0, 1)."""
     for i in range(len(rows)):
-        row = rows[i]
-        for k in range(out.shape[1]):
-            counts[row] += np.uint64(1)
-            bits = _mix(keys[row] + counts[row] * _GOLDEN)
+        key, count, n = keys[rows[i]], counts[rows[i]], out.shape[1]
+        for k in range(n):
+            bits = _mix(key + (count + np.uint64(k + 1)) * _GOLDEN)
             out[i, k] = (bits >> _11) * 2.0**-53
+        counts[rows[i]] = count + np.uint64(n)
 
 
 class RandomStreams:
@@ -63,23 +64,16 @@ class RandomStreams:
 
     @classmethod
     def keyed(cls, seeds: Array, episodes: Array, purpose: str) -> RandomStreams:
-        """Return new streams, keyed by seed of the world, episode and purpose.
+        """Return the streams of a `StreamSet` for one purpose, begun.
 
         Args:
             seeds: (W,) integer seeds, one per world.
             episodes: (W,) integer episode numbers.
-            purpose: use of the numbers; streams of two purposes are independent.
+            purpose: use of the numbers.
         """
-        rows = np.arange(len(seeds))
-        keys, counts = np.zeros((2, len(rows)), np.uint64)
-        rng = cls(keys, counts, rows)
-        rng.renew(rows, seeds, episodes, purpose)
-        return rng
-
-    def renew(self, rows: Array, seeds: Array, episodes: Array, purpose: str) -> None:
-        """Restart the streams of some worlds, by index, for their next episode."""
-        salt = zlib.crc32(purpose.encode())
-        _begin(self._keys, self._counts, rows, seeds, episodes, salt)
+        streams = StreamSet(len(seeds), purpose)
+        streams.renew(np.arange(len(seeds)), seeds, episodes)
+        return streams.of(purpose)
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -92,10 +86,47 @@ class RandomStreams:
         """Draw (W, *shape) numbers uniform in [low, high)."""
         unit = np.empty((len(self._rows), math.prod(shape)))
         _unit(self._keys, self._counts, self._rows, unit)
-        return low + (high - low) * unit.reshape(len(unit), *shape)
+        drawn = unit.reshape(len(unit), *shape)
+        drawn *= high - low
+        drawn += low
+        return drawn
 
     def normal(self, *shape: int) -> Array:
         """Draw (W, *shape) standard normal numbers (Box and Muller's transform)."""
         pair = self.uniform(0.0, 1.0, 2, *shape)
         radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))
+
+
+class StreamSet:
+    """Random streams of W worlds for several purposes, none of which tells of another.
+
+    They are keyed by the seed of the world, the number of its episode and the purpose.
+
+    Args:
+        worlds: W.
+        purposes: names of the uses of the numbers.
+    """
+
+    def __init__(self, worlds: int, *purposes: str) -> None:
+        self._place = {purpose: k for k, purpose in enumerate(purposes)}
+        salts = [zlib.crc32(purpose.encode()) for purpose in purposes]
+        self._salts = np.array(salts, np.uint64)
+        self._keys, self._counts = np.zeros((2, len(salts), worlds), np.uint64)
+        self._all = np.arange(worlds)
+
+    def renew(self, rows: Array, seeds: Array, episodes: Array) -> None:
+        """Restart the streams of some worlds, by index, for their next episode.
+
+        Args:
+            rows: (w,) indices.
+            seeds: (W,) integer seeds, one per world.
+            episodes: (W,) integer episode numbers.
+        """
+        _begin(self._keys, self._counts, rows, seeds, episodes, self._salts)
+
+    def of(self, purpose: str, rows: Array | None = None) -> RandomStreams:
+        """Return the streams for a purpose, shared, of some worlds; None for all."""
+        k = self._place[purpose]
+        rows = self._all if rows is None else rows
+        return RandomStreams(self._keys[k], self._counts[k], rows)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cache
 
 import numpy as np
 from numba import njit
 
-from marl_airhockey.core.geometry import half_planes, length
+from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.core.laws import fly, impulse, wall_restitution
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
@@ -54,13 +55,27 @@ def falling_puck(rng: RandomStreams) -> Array:
     Returns:
         (W, 5) x, y, vx, vy, m, m/s, and speed of the edge by spin, m/s.
     """
-    return _spun(rng.uniform(FALLING[:, 0], FALLING[:, 1], 5))
-
-
-def _spun(puck: Array) -> Array:
-    """Multiply the last of five columns, a share of the puck's speed, by it."""
-    puck[:, 4] *= length(puck[:, 2:4])
+    puck = rng.uniform(FALLING[:, 0], FALLING[:, 1], 5)
+    _spin(puck)
     return puck
+
+
+@njit(cache=True)
+def _spin(puck: Array) -> None:
+    """Multiply the last of five columns, a share of the puck's speed, by it."""
+    for w in range(len(puck)):
+        puck[w, 4] *= math.sqrt(puck[w, 2] ** 2 + puck[w, 3] ** 2)
+
+
+@njit(cache=True)
+def _drop(
+    puck: Array, body: int, position: Array, velocity: Array, edge: Array
+) -> None:
+    """Place a body of all worlds by columns of `falling_puck`."""
+    for w in range(len(puck)):
+        position[w, body, 0], position[w, body, 1] = puck[w, 0], puck[w, 1]
+        velocity[w, body, 0], velocity[w, body, 1] = puck[w, 2], puck[w, 3]
+        edge[w, body] = puck[w, 4]
 
 
 def falling(rng: RandomStreams, scene: Scene) -> State:
@@ -69,7 +84,8 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
     No puck overlaps another.
     """
     state, draws = scene.still_state(len(rng)), rng.uniform(HOME[:, 0], HOME[:, 1], 7)
-    state.position[:, 0], puck = draws[:, :2], _spun(draws[:, 2:])
+    state.position[:, 0], puck = draws[:, :2], draws[:, 2:]
+    _spin(puck)
     first, radius = scene.bodies.puck.start, scene.table.puck_radius
     for k in range(first, scene.bodies.puck.stop):
         others = state.position[:, first:k]
@@ -80,8 +96,8 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
 
         if k > first:
             puck = redraw(rng, falling_puck, apart)
-        state.position[:, k], state.velocity[:, k] = puck[:, :2], puck[:, 2:4]
-        state.spin[:, k] = puck[:, 4] / radius
+        _drop(puck, k, state.position, state.velocity, state.spin)
+    state.spin[:, scene.bodies.puck] /= radius
     return state
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.delay import ALL, Rows
@@ -42,21 +42,21 @@ class DrivenSeat:
             )
         self._layout = observer.prepare(driver.observe or observer.observe)
         self._num_worlds = num_worlds
-        never = np.zeros(num_worlds, np.int64)
-        self._rng = RandomStreams.keyed(never, never, f"driver {index}")
+        self._purpose = f"driver {index}"
+        self._streams = StreamSet(num_worlds, self._purpose)
         self._held = np.zeros((num_worlds, 2))
         self._memory: dict[str, Array] = {}
         driver.__enter__()
 
     def reset(self, worlds: Array, seeds: Array, episodes: Array) -> None:
         """Begin an episode in some worlds, by index, with random streams of its own."""
-        self._rng.renew(worlds, seeds, episodes, f"driver {self.index}")
+        self._streams.renew(worlds, seeds, episodes)
         self.begin(worlds)
 
     def begin(self, worlds: Array) -> None:
         """Begin with a new memory in some worlds, by index."""
         self._held[worlds] = 0.0
-        rng = self._rng.select(worlds)
+        rng = self._streams.of(self._purpose, worlds)
         rows = self.driver.reset(self._seat, rng, len(worlds))
         for name, row in rows.items():
             if name not in self._memory:
@@ -123,7 +123,7 @@ class DrivenSeat:
             labels=self._layout.labels,
             top_speed=physics["paddle_speed"],
             reach=np.asarray(self._seat.reach),
-            rng=self._rng.select(worlds),
+            rng=self._streams.of(self._purpose).select(worlds),
             seat=self.index,
             scenario_memory=memory,
         )

@@ -11,7 +11,7 @@ import numpy as np
 
 from marl_airhockey.contracts.observable import FRAMES, HISTORY
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.rng import RandomStreams, StreamSet
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
@@ -52,7 +52,7 @@ class Sensor:
         """True if `history` and `frames` are kept, as an observation needs them."""
 
     def reset(
-        self, worlds: Array, state: State, values: dict[str, Array], rng: RandomStreams
+        self, worlds: Array, state: State, values: dict[str, Array], streams: StreamSet
     ) -> State:
         """Begin an episode in some worlds and return its first sensed state.
 
@@ -62,7 +62,7 @@ class Sensor:
             worlds: (W,) their indices.
             state: of all B worlds.
             values: physical parameters, (B,) each.
-            rng: the sensor's streams.
+            streams: those of the worlds, for "sensor" too.
         """
         if not self.ideal:
             position = state.position[worlds, self.camera]
@@ -72,7 +72,7 @@ class Sensor:
             late = values["observation_delay"][worlds] + self.control_dt
             self._position[worlds] = position - velocity * late[:, None, None]
             self._visible[worlds] = True
-        sensed = self.sense(state, values, rng, worlds)
+        sensed = self.sense(state, values, streams, worlds)
         if self.keeps_history:
             self.history[worlds] = self.history[worlds][:, -1:]
             self.frames[worlds] = self.frames[worlds][:, -1:]
@@ -82,7 +82,7 @@ class Sensor:
         self,
         state: State,
         values: dict[str, Array],
-        rng: RandomStreams,
+        streams: StreamSet,
         rows: Rows = ALL,
     ) -> State:
         """Return the sensed state; time has passed in the worlds ``rows`` alone."""
@@ -90,7 +90,8 @@ class Sensor:
             return state
         sensed = state
         if not self.ideal:
-            self._look(state, values, rng.select(rows), rows)
+            rng = streams.of("sensor").select(rows)
+            self._look(state, values, rng, rows)
             position, velocity = state.position.copy(), state.velocity.copy()
             position[:, self.camera] = self._position
             velocity[:, self.camera] = self._speed

@@ -10,7 +10,7 @@ from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
@@ -69,10 +69,7 @@ class World:
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
         self._seeded, self.seeds = False, np.zeros(b, np.int64)
         """(B,) seed of each world"""
-        self._streams = {
-            purpose: RandomStreams.keyed(self.seeds, self.seeds, purpose)
-            for purpose in ("start", "physics", "sensor", "serve")
-        }
+        self._streams = StreamSet(b, "start", "physics", "sensor", "serve")
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._state
@@ -164,14 +161,12 @@ class World:
         """Begin a new episode in some worlds, by index (W,)."""
         number = self._episode.number
         number[worlds] += 1
-        for purpose, stream in self._streams.items():
-            stream.renew(worlds, self.seeds, number, purpose)
-        changed = self._episode.draw_physics(
-            self.physics, self._streams["physics"], worlds
-        )
+        self._streams.renew(worlds, self.seeds, number)
+        stream = self._streams.of("physics")
+        changed = self._episode.draw_physics(self.physics, stream, worlds)
         if len(changed):
             self.backend.set_physics(self._episode.physics, changed)
-        rng = self._streams["start"].select(worlds)
+        rng = self._streams.of("start", worlds)
         self._begin(worlds, *self.scenario.reset(rng, len(worlds)))
         for seat in self.driven:
             seat.reset(worlds, self.seeds, number)
@@ -198,7 +193,7 @@ class World:
         worlds = np.arange(self.num_worlds) if worlds is None else np.asarray(worlds)
         rows = settled(state, self.scene, len(worlds))
         if memory is None:
-            rng = self._streams["start"].select(worlds)
+            rng = self._streams.of("start", worlds)
             memory = self.scenario.initial_memory(rows, rng)
         self._begin(worlds, rows, checked_memory(memory, self._memory, len(worlds)))
         self._episode.cycles[worlds] = np.round(rows.time / self.control_dt)
@@ -233,7 +228,7 @@ class World:
 
     def _sense(self, starting: Array | None = None) -> None:
         """Sense the state, beginning anew in some worlds, by index."""
-        now = self._state, self._episode.physics, self._streams["sensor"]
+        now = self._state, self._episode.physics, self._streams
         reset, sense = self.sensor.reset, self.sensor.sense
         self._sensed = sense(*now) if starting is None else reset(starting, *now)
 
@@ -275,14 +270,16 @@ class World:
             # `take` is several times faster than an index.
             rows = self._state.map(lambda x: x.take(served, 0))
             memory = {name: x.take(served, 0) for name, x in self._memory.items()}
-            rng = self._streams["serve"].select(served)
+            rng = self._streams.of("serve", served)
             self._place(served, *self.scenario.serve(rng, rows, memory))
             self._sense(served)
         now = self._sensed, self._memory, self.open
         shown, observer = moment.verdict.shown, self.observer
         result.observation = observer.after_step(shown, *now, served)
+        if not self.autoreset:
+            return
         ended = result.terminated | result.truncated
-        if self.autoreset and np.count_nonzero(ended):
+        if np.count_nonzero(ended):
             worlds = np.flatnonzero(ended)
             result.final_observation = duplicate(result.observation)
             self.reset_worlds(worlds)

@@ -5,6 +5,7 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
+from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import make_agent
 
@@ -48,7 +49,9 @@ def test_it_plays_both_ends_alike(agent):
         getattr(flipped, name)[:] = -getattr(near.state, name)[:, [1, 0, 2]]
     far.set_state(flipped)
     for world, seat in ((near, 0), (far, 1)):
-        world.driven[seat]._rng.renew(everywhere, near.seeds, near.seeds, "same")
+        driven, streams = world.driven[seat], StreamSet(3, "same")
+        streams.renew(everywhere, near.seeds, near.seeds)
+        driven._purpose, driven._streams = "same", streams
     for _ in range(40):
         near.step(np.zeros((3, 0, 2)))
         far.step(np.zeros((3, 0, 2)))

@@ -11,7 +11,7 @@ from marl_airhockey.backends.numba.arrays import (
     make_coefficients,
     make_walls,
 )
-from marl_airhockey.backends.numba.geometry import find_leaning
+from marl_airhockey.backends.numba.geometry import begin_pucks
 from marl_airhockey.backends.numba.kernel import advance, work_space
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.core.physics import PARAMETERS
@@ -76,11 +76,10 @@ class NumbaBackend(Backend):
 
     def reset(self, state: State, worlds: Array) -> None:
         super().reset(state, worlds)
-        self._out[worlds], self._pinned[worlds] = False, 0.0
         static, radius = self._static, self.scene.table.puck_radius
-        find_leaning(
+        begin_pucks(
             *(worlds, state.puck, radius, static.walls, static.wall_side),
-            self._against,
+            *(self._against, self._out, self._pinned),
         )
 
     def stage(self, command: Command, before: State, after: State) -> Stage:

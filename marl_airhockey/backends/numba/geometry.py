@@ -130,15 +130,17 @@ def stays_in_reach(
 
 
 @njit(cache=True, error_model="numpy")
-def find_leaning(
+def begin_pucks(
     worlds: Array,
     pucks: Array,
     radius: float,
     walls: Array,
     wall_side: Array,
     against: Array,
+    out: Array,
+    pinned: Array,
 ) -> None:
-    """Find the walls that pucks touch in some worlds.
+    """Begin with pucks in play in some worlds, and find the walls that they touch.
 
     Args:
         worlds: (W,) indices.
@@ -147,10 +149,12 @@ def find_leaning(
         walls: see `make_walls`, like the next.
         wall_side: of each wall, -1 for edges of reaches.
         against: (B, pucks, sides) bool, filled in these worlds.
+        out: (B, pucks) bool, like the next set to none.
+        pinned: (B, pucks) s.
     """
     for b in worlds:
         for k in range(pucks.shape[1]):
-            against[b, k] = False
+            against[b, k], out[b, k], pinned[b, k] = False, False, 0.0
             for f in range(len(walls)):
                 if wall_side[f] < 0:
                     continue
