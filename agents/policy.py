@@ -7,6 +7,8 @@ from pathlib import Path
 from marl_airhockey.toolkit.policies import Policy, load_policy
 
 
-def make(path: str | Path, deterministic: bool = True) -> Policy:
+def make(
+    path: str | Path, deterministic: bool = True, trust: bool | None = None
+) -> Policy:
     """Load the policy; see `toolkit.policies.load_policy`."""
-    return load_policy(path, deterministic)
+    return load_policy(path, deterministic, trust)

@@ -1,6 +1,7 @@
 """Air hockey for robot learning and multi-agent reinforcement learning."""
 
 from pathlib import Path
+from types import ModuleType
 
 _here = Path(__file__).parent
 if not (_here / "scenarios").is_dir():
@@ -8,7 +9,14 @@ if not (_here / "scenarios").is_dir():
     __path__.append(str(_here.parent))
 
 from marl_airhockey.envs.registration import register_all  # noqa: E402
-from marl_airhockey.make import env, make_sb3_vec, make_vec, make_world, parallel_env  # noqa: E402
+from marl_airhockey.make import (  # noqa: E402
+    env,
+    make_sb3_vec,
+    make_vec,
+    make_world,
+    parallel_env,
+    versioned_module,
+)
 from marl_airhockey.registry import (  # noqa: E402
     agent_names,
     backend_names,
@@ -34,3 +42,8 @@ __all__ = [
     "parallel_env",
     "scenario_names",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    # `from marl_airhockey import duel_v0`, as tutorials for PettingZoo import a game.
+    return versioned_module(name)

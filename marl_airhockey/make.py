@@ -5,9 +5,12 @@ What needs gymnasium, pettingzoo or stable-baselines3 is imported when it is bui
 
 from __future__ import annotations
 
+from functools import partial
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
 
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.registry import make_scenario, scenario_names
 from marl_airhockey.world.world import World
 
 if TYPE_CHECKING:
@@ -72,3 +75,27 @@ def make_sb3_vec(
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 
     return AirHockeyVecEnv(scenario, num_worlds, **keywords)
+
+
+def versioned_module(name: str) -> ModuleType:
+    """Return a module as PettingZoo's own games are: ``duel_v0.parallel_env()``.
+
+    Args:
+        name: of a scenario and its version.
+
+    Raises:
+        AttributeError: no such scenario.
+        ImportError: another version of it.
+    """
+    scenario, mark, version = name.rpartition("_v")
+    if not mark or not version.isdigit() or scenario not in scenario_names():
+        raise AttributeError(f"module 'marl_airhockey' has no attribute {name!r}")
+    current = make_scenario(scenario).version
+    if int(version) != current:
+        raise ImportError(
+            f"{name}: this release of marl_airhockey plays {scenario}_v{current}"
+        )
+    module = ModuleType(f"marl_airhockey.{name}", f"PettingZoo game {name}.")
+    vars(module)["parallel_env"] = partial(parallel_env, scenario)
+    vars(module)["env"] = vars(module)["raw_env"] = partial(env, scenario)
+    return module

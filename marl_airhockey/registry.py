@@ -15,6 +15,8 @@ from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
+from marl_airhockey.toolkit.players import driver_of
 
 ZOO = Path(__file__).parent / "zoo"
 DEFAULT_BACKEND = "numba"
@@ -33,9 +35,23 @@ def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
     return importlib.import_module(f"marl_airhockey.{folder}.{name}")
 
 
+def _maker(kind: str, folder: str, group: str, name: str) -> Callable[..., object]:
+    """Return what makes the scenario or driver of a name, ours or a plugin's."""
+    own, others = _names(folder), plugins(group)
+    if name in own or name not in others:
+        module = _load(kind, folder, name, sorted({*own, *others}))
+        return cast(Callable[..., object], module.make)
+    return cast(Callable[..., object], load_plugin(others[name]))
+
+
 def scenario_names() -> list[str]:
-    """Return the names of all scenarios: the files of ``scenarios/``."""
+    """Return the names of all scenarios of ours: the files of ``scenarios/``."""
     return _names("scenarios")
+
+
+def plugin_names(kind: str) -> list[str]:
+    """Return the names that installed packages add: "scenarios" or "drivers"."""
+    return sorted(plugins(kind))
 
 
 def gymnasium_id(name: str) -> str:
@@ -57,14 +73,49 @@ def backend_names() -> list[str]:
 
 
 def make_scenario(name: str, **options: Any) -> Scenario:
-    """Build the scenario of ``scenarios/<name>.py``.
+    """Build the scenario of ``scenarios/<name>.py``, or that of an installed package.
+
+    No code runs that a text names: see `find_scenario`.
 
     Raises:
         ValueError: an unknown name or option, or an option that makes no sense.
     """
-    module = _load("scenario", "scenarios", name, scenario_names())
-    known = [f.name for f in dataclasses.fields(module.make)]
-    return cast(Scenario, _build(f"option of {name}", module.make, options, known))
+    make = _maker("scenario", "scenarios", "scenarios", name)
+    return _scenario(name, make, options)
+
+
+def find_scenario(given: str | Scenario | type[Scenario], **options: Any) -> Scenario:
+    """Build the scenario that somebody asks for.
+
+    Args:
+        given: a name; code, ``my_task.py`` or ``package.module:Task``; a class; or a
+            scenario, which is returned as it is.
+        **options: fields of the scenario.
+
+    Raises:
+        ValueError: an unknown name or option, or code that makes no scenario.
+    """
+    if isinstance(given, Scenario):
+        if options:
+            names = sorted(options)
+            raise ValueError(f"options {names}: give them to the scenario object")
+        return given
+    if isinstance(given, str):
+        if not names_code(given):
+            return make_scenario(given, **options)
+        return _scenario(given, load_code(given, Scenario), options)
+    return _scenario(getattr(given, "__name__", repr(given)), given, options)
+
+
+def _scenario(name: str, make: Any, options: Mapping[str, Any]) -> Scenario:
+    if isinstance(make, Scenario):
+        return find_scenario(make, **options)
+    if not (isinstance(make, type) and issubclass(make, Scenario)):
+        raise ValueError(
+            f"{name}: {make!r} is no scenario; give a class below Scenario"
+        )
+    known = [f.name for f in dataclasses.fields(make)]
+    return cast(Scenario, _build(f"option of {name}", make, options, known))
 
 
 def zoo_names() -> list[str]:
@@ -72,33 +123,52 @@ def zoo_names() -> list[str]:
     return sorted(f"zoo/{path.stem}" for path in ZOO.glob("*.npz"))
 
 
-def make_agent(name: str | Path, **options: Any) -> Driver:
-    """Build the driver that a text names.
+def make_agent(player: object, **options: Any) -> Driver:
+    """Build the driver that somebody asks for.
 
     Args:
-        name: of a file of ``agents/``, with options behind a colon or not
+        player: the name of a file of ``agents/``, with options behind a colon or not
             (``allround:strength=fair,depth=0.05``); of a trained policy that comes with
-            the library (``zoo/duel``); or the path of a policy's file or run folder.
+            the library (``zoo/duel``); of an installed package's driver; the path of a
+            policy's file or run folder; code, ``my_driver.py`` or
+            ``package.module:Class``; or an object, see `toolkit.players.driver_of`.
         **options: besides those in the name.
 
     Raises:
         ValueError: an unknown name or option, or one that makes no sense.
     """
-    path, (short, _, given) = Path(name), str(name).partition(":")
-    if short in agent_names() or short.startswith("zoo/"):
+    if not isinstance(player, (str, Path)):
+        return _driver(type(player).__name__, player, options)
+    text, path = str(player), Path(player)
+    short, _, given = text.partition(":")
+    if short in {*agent_names(), *plugins("drivers")} or short.startswith("zoo/"):
         options = dict(_option(part) for part in given.split(",") if part) | options
         if short.startswith("zoo/"):
             if short not in zoo_names():
                 raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
             short, options["path"] = "policy", ZOO / f"{short[4:]}.npz"
-        module = _load("driver", "agents", short, agent_names())
-        known = list(inspect.signature(module.make).parameters)
-        return cast(Driver, _build(f"option of {short}", module.make, options, known))
+        make = _maker("driver", "agents", "drivers", short)
+        return _driver(short, make, options)
+    if names_code(text):
+        return _driver(text, load_code(text, Driver), options)
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
         return make_agent("policy", path=path, **options)
+    names = [*agent_names(), *plugin_names("drivers")]
     raise ValueError(
-        unknown_name("driver", name, agent_names()) + "; or the path of a policy"
+        unknown_name("driver", text, names)
+        + "; or a policy's path, my_driver.py or package.module:Class"
     )
+
+
+def _driver(name: str, player: Any, options: Mapping[str, Any]) -> Driver:
+    """Return a driver from what makes one, or from a player of any kind."""
+    makes = isinstance(player, type) and issubclass(player, Driver)
+    if makes or (inspect.isfunction(player) and player.__name__ == "make"):
+        known = list(inspect.signature(player).parameters)
+        player = _build(f"option of {name}", player, options, known)
+    elif options:
+        raise ValueError(f"options {sorted(options)}: {name} takes none")
+    return driver_of(player)
 
 
 def _option(part: str) -> tuple[str, str | float]:

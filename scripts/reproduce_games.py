@@ -67,7 +67,7 @@ def competitive_table(game: str, folders: Sequence[Path]) -> Table:
     for folder in folders:
         rivals: list[Driver] = [make_agent(name) for name in (*SEEN, *UNSEEN)]
         rivals.append(load_policy(checkpoint(folder, 0.1)))
-        policy = load_policy(folder / "last.zip")
+        policy = load_policy(folder / "last.npz")
         score, _ = play_against(game, policy, rivals, GAMES, SEED, ON_NUMBA)
         columns.append(score)
     for i, name in enumerate(names):
@@ -99,7 +99,7 @@ def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
             name, f"{returns.mean():.1f} ({low:.1f}..{high:.1f})", f"{share:.3f}"
         )
 
-    policies = [load_policy(folder / "last.zip") for folder in folders]
+    policies = [load_policy(folder / "last.npz") for folder in folders]
     add("one seed", [(p, p) for p in policies])
     mixed = [(a, b) for a in policies for b in policies if a is not b]
     if mixed:

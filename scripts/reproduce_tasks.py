@@ -78,7 +78,7 @@ def train_seed(scenario: str, profile: str, seed: int, folder: Path) -> dict[str
             cases[f"{hits} hits"] = (True, {**numba, "options": {"hits": hits}})
     row: dict[str, Any] = {"scenario": scenario, "profile": profile, "seed": seed}
     for name, (mean, keywords) in cases.items():
-        policy = load_policy(folder / "last.zip", deterministic=mean)
+        policy = load_policy(folder / "last.npz", deterministic=mean)
         found = evaluate(policy, name, scenario, EPISODES, keywords=keywords)
         row[name] = found.success
         if name == "success":

@@ -18,6 +18,7 @@ from marl_airhockey.cli.options import (
     Physics,
     Profile,
     Scenario,
+    Trusting,
     Workers,
     app,
     bar,
@@ -45,6 +46,7 @@ def evaluate_driver(
     physics: Physics = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     num_workers: Workers = None,
+    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure a driver over episodes that training never sees."""

@@ -14,6 +14,7 @@ from marl_airhockey.cli.options import (
     Backend,
     Options,
     Profile,
+    Trusting,
     bar,
     console,
     environment,
@@ -57,6 +58,7 @@ def league(
     exploit_seeds: Annotated[
         int, typer.Option(help="Best responses to each, of seeds 0 .. N - 1.", min=1)
     ] = 1,
+    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Let everybody play everybody: ratings, matrix, circles of wins."""

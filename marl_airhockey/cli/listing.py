@@ -39,7 +39,7 @@ def list_scenarios(
     if as_json:
         console.print_json(json.dumps(data))
         return
-    console.print(f"[bold]{scenario}[/bold]  {data['id']}\n{data['what']}\n")
+    console.print(f"[bold]{scenario}[/bold]  {data['id'] or ''}\n{data['what']}\n")
     for title in ("seats", "observation", "reward", "options"):
         table = Table(*data[title][0], title=title, title_justify="left")
         for row in data[title]:

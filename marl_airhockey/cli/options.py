@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from marl_airhockey.core.physics import load_physics
 from marl_airhockey.jit.threads import use_threads
+from marl_airhockey.toolkit.trust import Trust
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
@@ -43,6 +44,19 @@ Workers = Annotated[
         help="Threads that step the worlds; else MARL_AIRHOCKEY_THREADS says, or 1.",
         min=1,
         callback=use_threads,
+    ),
+]
+
+
+def _trust(given: bool) -> bool:
+    Trust.answer = True if given else Trust.answer
+    return given
+
+
+Trusting = Annotated[
+    bool,
+    typer.Option(
+        "--trust", help="Load policies that hold pickled Python.", callback=_trust
     ),
 ]
 Drivers = Annotated[

@@ -17,6 +17,7 @@ from marl_airhockey.cli.options import (
     Backend,
     Options,
     Profile,
+    Trusting,
     console,
     settings,
 )
@@ -81,6 +82,7 @@ def play(
     host: Host = "127.0.0.1",
     port: Port = 8480,
     browser: Browser = True,
+    trust: Trusting = False,
 ) -> None:
     """Play against a policy, a script or each other in the browser."""
     require("starlette", "play")

@@ -16,6 +16,7 @@ from marl_airhockey.cli.options import (
     Options,
     Physics,
     Profile,
+    Trusting,
     Workers,
     app,
     bar,
@@ -60,6 +61,7 @@ def train(
     physics: Physics = None,
     resume: Annotated[Path | None, typer.Option(help="Resume this run.")] = None,
     num_workers: Workers = None,
+    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""

@@ -13,6 +13,7 @@ from marl_airhockey.cli.options import (
     AsJson,
     Options,
     Physics,
+    Trusting,
     Workers,
     bar,
     console,
@@ -57,6 +58,7 @@ def transfer(
     ] = None,
     option: Options = None,
     num_workers: Workers = None,
+    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure policies from the 2D table elsewhere: success with 95 % intervals."""

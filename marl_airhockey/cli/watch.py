@@ -13,6 +13,7 @@ from marl_airhockey.cli.options import (
     Drivers,
     Options,
     Profile,
+    Trusting,
     app,
     console,
     environment,
@@ -43,6 +44,7 @@ def watch(
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 0,
     browser: cli_play.Browser = True,
+    trust: Trusting = False,
 ) -> None:
     """Watch a driver play, in a window or as a video; or a recording of play.
 

@@ -60,6 +60,16 @@ class Driver:
     control_dt: float | None = None
     """s between two decisions, a multiple of the environment's; None for the same."""
 
+    def check(self, observation: Array | Mapping[str, Array]) -> None:
+        """Refuse, before the first step, observations that it cannot act on.
+
+        Args:
+            observation: of a few worlds, all zeros.
+
+        Raises:
+            ValueError: it cannot act on such observations, and why.
+        """
+
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         """Return the memory of ``worlds`` worlds whose episode begins."""
         return {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -14,8 +15,10 @@ from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.registry import (
     agent_names,
     backend_names,
+    find_scenario,
     gymnasium_id,
     make_scenario,
+    plugin_names,
     scenario_names,
     zoo_names,
 )
@@ -29,22 +32,29 @@ def what(scenario: Scenario) -> str:
 
 
 def summary() -> dict[str, Any]:
-    """Return the names of all scenarios, drivers and backends."""
+    """Return the names of all scenarios, drivers and backends.
+
+    A scenario of an installed package that cannot be built is left out, with a warning.
+    """
     rows = []
-    for name in scenario_names():
-        scenario = make_scenario(name)
+    for name in (*scenario_names(), *plugin_names("scenarios")):
+        try:
+            scenario = make_scenario(name)
+        except ValueError as error:
+            warnings.warn(f"scenario {error}", RuntimeWarning, stacklevel=2)
+            continue
         rows.append(
             {
                 "name": name,
                 "what": what(scenario),
                 "seats": len(scenario.scene.seats),
                 "seconds": scenario.seconds,
-                "id": gymnasium_id(name),
+                "id": gymnasium_id(name) if name in scenario_names() else None,
             }
         )
     return {
         "scenarios": rows,
-        "drivers": agent_names(),
+        "drivers": [*agent_names(), *plugin_names("drivers")],
         "zoo": zoo_names(),
         "backends": backend_names(),
     }
@@ -52,12 +62,12 @@ def summary() -> dict[str, Any]:
 
 def describe(name: str) -> dict[str, Any]:
     """Return seats, observation, reward terms and options of a scenario."""
-    scenario = make_scenario(name)
+    scenario = find_scenario(name)
     layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
     doc = (type(scenario).__doc__ or "").strip()
     return {
         "name": name,
-        "id": gymnasium_id(name),
+        "id": gymnasium_id(name) if name in scenario_names() else None,
         "what": what(scenario) + "\n" + " ".join(doc.split()),
         "seats": [
             {

@@ -14,7 +14,7 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_world, find_scenario
+from marl_airhockey.world.build import Keywords, build_world, scenario_of
 from marl_airhockey.world.step_result import StepResult
 from marl_airhockey.world.world import World
 
@@ -71,7 +71,7 @@ def build_driven_world(
     Raises:
         ValueError: a seat without a driver, named.
     """
-    scene = find_scenario(scenario, keywords).scene
+    scene = scenario_of(scenario, keywords).scene
     team = [i for i, s in enumerate(scene.seats) if s.team == scene.seats[0].team]
     mates = {f"paddle_{i}": driver for i in team}
     drivers = {**mates, **keywords.get("drivers", {}), "paddle_0": driver}

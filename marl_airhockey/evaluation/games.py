@@ -9,7 +9,7 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_world, find_scenario
+from marl_airhockey.world.build import Keywords, build_world, scenario_of
 from marl_airhockey.world.roster import Roster
 
 
@@ -58,7 +58,7 @@ def play_against(
         The player's mean score and mean margin against each rival, (R,) each.
     """
     keywords = keywords or {}
-    scene = find_scenario(scenario, keywords).scene
+    scene = scenario_of(scenario, keywords).scene
     teams = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
     rows = np.arange(1, len(rivals) + 1).repeat(games)
     lineups = rows[:, None].repeat(teams, axis=1)

@@ -12,6 +12,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.games import GameResults, play_games
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
+from marl_airhockey.toolkit.policies import policies_of
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 
@@ -76,7 +77,7 @@ def find_policies(folder: Path) -> list[str]:
         ValueError: a folder without policies.
     """
     runs = [path.parent for path in sorted(folder.rglob("config.toml"))]
-    inside = {run for run in runs if (run / "last.zip").exists()}
+    inside = {run for run in runs if any(map(Path.exists, policies_of(run)))}
     files = [
         path
         for kind in ("npz", "onnx")

@@ -46,7 +46,7 @@ def best_response(
         changes = {"drivers": drivers, "total_steps": steps, "seed": seed}
         train(preset(scenario, {**changes, "evaluations": 4}), folder)
     lineups = np.array([[0, 1], [1, 0]]).repeat(GAMES // 2, axis=0)
-    response = load_policy(folder / "last.zip")
+    response = load_policy(folder / "last.npz")
     results = play_games(
         scenario,
         [response, make_agent(player)],

@@ -9,13 +9,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from stable_baselines3 import PPO
-
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
-from marl_airhockey.learn.network import to_numpy
 from marl_airhockey.learn.run import Progress
 from marl_airhockey.registry import make_agent, make_scenario
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
@@ -63,10 +60,9 @@ def export_policy(run: Path, out: Path) -> NumpyPolicy:
 
 def _load_last(run: Path) -> NumpyPolicy:
     """Return the last policy of a run."""
-    if (run / "last.npz").exists():
-        return NumpyPolicy.load(run / "last.npz")
-    model = PPO.load(run / "last.zip", device="cpu")
-    return to_numpy(model, vars(model)["card"])
+    if not (run / "last.npz").exists():
+        raise ValueError(f"{run}: no .npz holds a policy on pixels")
+    return NumpyPolicy.load(run / "last.npz")
 
 
 def _episodes(policy: Policy, config: TrainConfig) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import RUN_FORMAT
+from marl_airhockey.toolkit.policies import RUN_FORMAT, numpy_actor
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -64,16 +64,9 @@ def to_numpy(model: PPO, card: Mapping[str, Any]) -> NumpyPolicy:
     """Return the actor of a model of `sb3.build_model` as plain arrays.
 
     Raises:
-        ValueError: another kind of model: pixels, dict goals, other layers.
+        ValueError: another kind of model: pixels, other layers.
     """
-    policy: Any = model.policy
-    scale, layers = policy.features_extractor, policy.mlp_extractor.policy_net
-    kinds = {type(layer) for layer in layers}
-    if not isinstance(scale, FixedScale) or kinds - {torch.nn.Linear, torch.nn.ReLU}:
-        raise ValueError(
-            "to_numpy: only policies on flat observations with ReLU layers"
-        )
-    return layers_to_numpy([*layers, policy.action_net], scale, policy.log_std, card)
+    return numpy_actor(model.policy.state_dict(), card)
 
 
 def layers_to_numpy(

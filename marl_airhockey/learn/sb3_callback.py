@@ -115,6 +115,8 @@ class TrainingCallback(BaseCallback):
         draft = self.run.folder / f"part-{name}.zip"
         self.model.save(draft)
         draft.replace(self.run.folder / f"{name}.zip")
+        if self.run.config.observe != "pixels":
+            self._to_numpy().save(self.run.folder / f"{name}.npz")
 
 
 def _predict(model: Any, observation: Any, deterministic: bool) -> Any:

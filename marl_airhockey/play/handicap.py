@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
@@ -76,6 +77,9 @@ class HandicappedDriver(Driver):
         self.observe = self.inner.observe
         self.control_dt = self.inner.control_dt or 0.05
         self._delay = round(self.handicap.reaction / self.control_dt)
+
+    def check(self, observation: Array | Mapping[str, Array]) -> None:
+        self.inner.check(observation)
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
         memory = self.inner.reset(seat, rng, worlds)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
 from marl_airhockey.study.plan import Opponent, Plan
+from marl_airhockey.toolkit.trust import Trust
 
 
 def open_match(plan: Plan) -> LiveMatch:
@@ -18,6 +19,8 @@ def open_match(plan: Plan) -> LiveMatch:
         {},
         {"backend": plan.backend, "profile": plan.profile, "options": plan.options},
     )
+    # A plan may come from elsewhere, and nobody looks at what it loads.
+    Trust.answer = False
     seats = len(match.seats)
     if (seats == 1) != (not plan.opponents):
         needs = "no opponents" if seats == 1 else "opponents"

@@ -9,6 +9,7 @@ from typing import Any
 
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON
+from marl_airhockey.plugins import names_code
 from marl_airhockey.study.orders import ORDERS
 
 EXAMPLE = Path(__file__).parent / "example.toml"
@@ -69,6 +70,19 @@ QUESTIONS = {
 """Questions that a plan can name by their id alone."""
 
 
+def refuse_code(name: str) -> None:
+    """Refuse a name that is Python code: a plan may come from elsewhere.
+
+    Raises:
+        ValueError: such a name.
+    """
+    if names_code(name):
+        raise ValueError(
+            f"{name}: a plan runs no code; name a driver or scenario of ours or of an "
+            "installed package, or an .npz or .onnx file"
+        )
+
+
 @dataclass(frozen=True)
 class Opponent:
     """Driver of all seats but the participant's in a block.
@@ -86,6 +100,7 @@ class Opponent:
     def __post_init__(self) -> None:
         if self.name == PERSON and self.handicap != Handicap():
             raise ValueError("a plan cannot give a person a handicap")
+        refuse_code(self.name)
         if not self.label:
             caption = self.handicap.caption
             label = f"{self.name} ({caption})" if caption else self.name
@@ -133,6 +148,7 @@ class Plan:
     """Digest of the plan's file, first 12 hexadecimal digits of SHA-256."""
 
     def __post_init__(self) -> None:
+        refuse_code(self.scenario)
         if self.order not in ORDERS:
             known = ", ".join(ORDERS)
             raise ValueError(f"order: {self.order!r} is unknown; there are {known}")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +13,9 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.types import Array
+
+LARGEST = 64_000_000
+"""Largest number of bytes that the arrays of a file may take."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +36,16 @@ class NumpyPolicy:
     log_std: Array
     card: Mapping[str, Any] = field(default_factory=dict)
 
-    def __call__(self, observation: Array, deterministic: bool = True) -> Array:
-        """Return mean actions (B, 2) for observations (B, D); the driver adds noise."""
+    def __call__(
+        self, observation: Array | Mapping[str, Array], deterministic: bool = True
+    ) -> Array:
+        """Return mean actions (B, 2) for observations (B, D); the driver adds noise.
+
+        Goals that are given apart follow the rest, as in a dict of gymnasium's.
+        """
+        if isinstance(observation, Mapping):
+            parts = ("observation", "achieved_goal", "desired_goal")
+            observation = np.concatenate([observation[part] for part in parts], -1)
         x = (observation - self.centre) / self.unit
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)
@@ -64,11 +77,29 @@ class NumpyPolicy:
             ValueError: a file of another kind.
         """
         try:
+            _check_size(path)
             with np.load(path, allow_pickle=False) as file:
                 count = sum(name.startswith("weight_") for name in file)
                 pairs = [(file[f"weight_{i}"], file[f"bias_{i}"]) for i in range(count)]
                 card = json.loads(str(file["card"]))
                 parts = file["centre"], file["unit"], file["log_std"]
                 return NumpyPolicy(pairs, *parts, card)
-        except (KeyError, OSError, ValueError) as error:
+        except (KeyError, OSError, ValueError, zipfile.BadZipFile) as error:
             raise ValueError(f"{path} is no policy of ours: {error}") from error
+
+
+def _check_size(path: Path) -> None:
+    """Refuse a file whose arrays would take too much memory, before there are any.
+
+    Raises:
+        ValueError: such a file, or one that holds something else.
+    """
+    total = 0
+    with zipfile.ZipFile(path) as archive:
+        for name in archive.namelist():
+            with archive.open(name) as file:
+                np.lib.format.read_magic(file)
+                shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+            total += math.prod(shape) * dtype.itemsize
+    if total > LARGEST:
+        raise ValueError(f"its arrays take {total:,} bytes, more than {LARGEST:,}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from collections.abc import Callable, Mapping
@@ -15,6 +16,7 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import require
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.types import Array
 
 Predict = Callable[[Any, bool], Array]
@@ -24,8 +26,8 @@ RUN_FORMAT = 2
 Raised whenever classes that a run pickles, or settings that it names, move: runs of
 another format are refused.
 """
-KINDS = ("zip", "npz")
-"""File name extensions of the policies that engines write."""
+KINDS = ("npz", "zip")
+"""File name extensions of the policies that engines write, the harmless one first."""
 
 
 @dataclass
@@ -51,31 +53,49 @@ class Policy(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        seen = view.observation
-        if not isinstance(seen, Mapping) and self.shape not in (None, seen.shape[1:]):
-            raise ValueError(
-                f"{self.source}: it expects observations of shape {self.shape}, "
-                f"this environment gives {seen.shape[1:]}; it was trained on another "
-                "scenario, or with other options (observe, goals, seats)"
-            )
-        action = np.asarray(self.predict(seen, self.deterministic), np.float64)
+        action = self._actions(view.observation)
         if self.noise is not None and not self.deterministic:
             action += self.noise * view.rng.normal(2)
         return np.clip(action, -1.0, 1.0), memory
 
+    def check(self, observation: Array | Mapping[str, Array]) -> None:
+        if isinstance(observation, Mapping):
+            shape: tuple[int, ...] = (sum(x.shape[1] for x in observation.values()),)
+        else:
+            shape = observation.shape[1:]
+        if self.shape not in (None, shape):
+            raise ValueError(
+                f"{self.source}: it expects observations of shape {self.shape}, "
+                f"this environment gives {shape}; it was trained on another "
+                "scenario, or with other options (observe, goals, seats)"
+            )
 
-def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
+    def _actions(self, observation: Any) -> Array:
+        return np.asarray(self.predict(observation, self.deterministic), np.float64)
+
+
+def load_policy(
+    path: str | Path, deterministic: bool = True, trust: bool | None = None
+) -> Policy:
     """Load a policy: a run folder of `train`, an SB3 .zip, an .onnx or an .npz.
 
-    An SB3 zip holds pickled Python: load only files that you trust.
+    An SB3 zip of our training is read as plain weights. Any other holds pickled Python,
+    which runs when it is loaded.
+
+    Args:
+        path: of the file or folder.
+        deterministic: return mean actions instead of samples.
+        trust: whether pickled Python in this file may run; None to ask at a terminal
+            and refuse elsewhere.
 
     Raises:
-        ValueError: a file of another kind; the message names the expected ones.
+        ValueError: a file of another kind; the message names the expected ones; or one
+            with pickled Python that is not trusted.
         RuntimeError: a missing extra; the message holds the command that installs it.
     """
     path = Path(path)
     if path.is_dir():
-        kept = [path / f"{n}.{kind}" for n in ("best", "last") for kind in KINDS]
+        kept = policies_of(path)
         path = next((file for file in kept if file.exists()), kept[0])
     if not path.exists():
         raise ValueError(f"{path}: there is no such policy file")
@@ -84,11 +104,16 @@ def load_policy(path: str | Path, deterministic: bool = True) -> Policy:
     if path.suffix == ".onnx":
         return _load_onnx(path, deterministic)
     if path.suffix == ".zip":
-        return _load_sb3(path, deterministic)
+        return _load_sb3(path, deterministic, trust)
     raise ValueError(
         f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file or an "
         ".npz"
     )
+
+
+def policies_of(run: Path) -> list[Path]:
+    """Return the paths that a run's policies may have, the one to take first."""
+    return [run / f"{name}.{kind}" for kind in KINDS for name in ("best", "last")]
 
 
 def check_run_format(source: Path, found: int) -> None:
@@ -119,10 +144,50 @@ def policy_driver(
     )
 
 
-def _load_sb3(path: Path, deterministic: bool) -> Policy:
-    require("stable_baselines3", "train")
-    import stable_baselines3 as sb3
+def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPolicy:
+    """Return the actor of a model of our training as plain arrays.
 
+    Args:
+        weights: tensors by their names in the model's policy.
+        card: description of the policy.
+
+    Raises:
+        ValueError: another kind of model: pixels, other layers.
+    """
+    layers = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(weights))]
+    layers = [*(name for name in layers if f"{name}.weight" in weights), "action_net"]
+    try:
+
+        def array(name: str) -> Array:
+            return np.array(weights[name].detach().cpu().numpy(), np.float32)
+
+        centre, rate = (array(f"features_extractor.{n}") for n in ("centre", "rate"))
+        pairs = [(array(f"{n}.weight"), array(f"{n}.bias")) for n in layers]
+        log_std = array("log_std")
+    except KeyError as error:
+        raise ValueError(
+            f"no .npz holds this policy (it has no {error}): only those on flat "
+            "observations or goals, with ReLU layers"
+        ) from error
+    # Goals follow the flat part as they are.
+    goals = pairs[0][0].shape[1] - len(centre)
+    centre, unit = np.pad(centre, (0, goals)), np.pad(1.0 / rate, (0, goals))
+    unit[len(rate) :] = 1.0
+    return NumpyPolicy(pairs, centre, unit, log_std, card)
+
+
+def _load_weights(path: Path, card: Mapping[str, Any]) -> NumpyPolicy:
+    """Read a zip of our training without running anything in it."""
+    import torch
+
+    with zipfile.ZipFile(path) as archive:
+        content = io.BytesIO(archive.read("policy.pth"))
+    weights = torch.load(content, map_location="cpu", weights_only=True)
+    return numpy_actor(weights, card)
+
+
+def _load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
+    require("stable_baselines3", "train")
     wrong = f"{path}: not a stable-baselines3 policy"
     try:
         with zipfile.ZipFile(path) as archive:
@@ -132,6 +197,12 @@ def _load_sb3(path: Path, deterministic: bool) -> Policy:
         raise ValueError(f"{wrong} ({error})") from error
     if "card" in data:  # of our own training
         check_run_format(path, data["card"].get("run_format", 1))
+        if data["card"].get("observe") != "pixels":
+            own = _load_weights(path, data["card"])
+            return policy_driver(own, str(path), deterministic)
+    require_trust(path, trust)
+    import stable_baselines3 as sb3
+
     families: dict[str, Any] = {"sac": sb3.SAC, "td3": sb3.TD3, "common": sb3.PPO}
     kinds = [kind for name, kind in families.items() if f".{name}." in module]
     if not kinds:

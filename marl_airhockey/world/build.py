@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any, TypedDict
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
@@ -17,20 +17,17 @@ from marl_airhockey.jit.threads import threads
 from marl_airhockey.registry import (
     DEFAULT_BACKEND,
     find_backend,
+    find_scenario,
     make_agent,
-    make_scenario,
 )
 from marl_airhockey.world.world import World
-
-if TYPE_CHECKING:
-    pass
 
 
 class Keywords(TypedDict, total=False):
     """Keywords of every environment; see `build_world` for meanings."""
 
     backend: str
-    drivers: Mapping[str, str | Driver]
+    drivers: Mapping[str, Any]
     seats: str
     profile: str
     observe: str
@@ -51,13 +48,13 @@ def build_world(
     """Build B worlds of a scenario from the keywords that all environments share.
 
     Args:
-        scenario: name of a file in ``scenarios/``, or a scenario object.
+        scenario: a name, code or an object, see `registry.find_scenario`.
         num_worlds: B.
         autoreset: whether worlds begin anew where an episode ended.
         keywords: all optional.
             backend: name of the physics ("numba").
-            drivers: drivers of seats by agent: names, paths of policies, or objects;
-                the other seats are open.
+            drivers: players of seats by agent, see `registry.make_agent`: names, paths
+                of policies, functions, models and so on; the other seats are open.
             seats: "robot" or "arcade".
             profile: "ideal" or "robot" (delays, noise, +-15 % on every parameter).
             observe: "velocity" (in the ideal profile), "history" (in the robot
@@ -85,7 +82,7 @@ def build_world(
     threads()  # Refused here if it makes no sense, not at the first step.
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
-    game = find_scenario(scenario, keywords)
+    game = scenario_of(scenario, keywords)
     scene = game.scene
     name = keywords.get("backend", DEFAULT_BACKEND)
     kind = find_backend(name)
@@ -105,8 +102,7 @@ def build_world(
     for agent, driver in keywords.get("drivers", {}).items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
-        built = make_agent(driver) if isinstance(driver, str) else driver
-        drivers[agents.index(agent)] = built
+        drivers[agents.index(agent)] = make_agent(driver)
     return World(
         game,
         kind(scene, num_worlds, control_dt, substeps),
@@ -133,14 +129,10 @@ def _check_times(
         raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
 
 
-def find_scenario(scenario: str | Scenario, keywords: Keywords) -> Scenario:
+def scenario_of(scenario: str | Scenario, keywords: Keywords) -> Scenario:
     """Return the scenario that keywords ask for."""
     options = dict(keywords.get("options", {}))
     for shared in ("seats", "goals"):
         if shared in keywords:
             options[shared] = keywords.get(shared)
-    if isinstance(scenario, str):
-        return make_scenario(scenario, **options)
-    if options:
-        raise ValueError(f"options {sorted(options)}: give them to the scenario object")
-    return scenario
+    return find_scenario(scenario, **options)

@@ -18,7 +18,8 @@ class DrivenSeat:
     """DrivenSeat seat of B worlds: its driver, the driver's memory and pace.
 
     Raises:
-        ValueError: a driver whose control_dt is no multiple of the environment's.
+        ValueError: a driver whose control_dt is no multiple of the environment's, or
+            which cannot act on its observations.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class DrivenSeat:
                 f"of the environment's {control_dt} s"
             )
         self._layout = observer.prepare(driver.observe or observer.observe)
+        driver.check(observer.blank(driver.observe, 3))
         self._num_worlds = num_worlds
         self._purpose = f"driver {index}"
         self._streams = StreamSet(num_worlds, self._purpose)

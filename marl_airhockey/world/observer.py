@@ -26,6 +26,7 @@ from marl_airhockey.world.sensor import Sensor
 Observation = Array | Mapping[str, Array]
 """(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
 PIXELS = 84
+GOALS = ("achieved_goal", "desired_goal")
 
 
 class Observer:
@@ -100,6 +101,24 @@ class Observer:
         (shown,) = self._shows[observe](vars(sensed), memory, history)
         return self.take(shown, seats)
 
+    def blank(self, observe: str | None, rows: int) -> Observation:
+        """Return observations of one seat that are all zeros, (rows, ...) each.
+
+        Args:
+            observe: the form; None for the open seats'.
+            rows: their number.
+        """
+        observe = observe or self.observe
+        if observe == "pixels":
+            return np.zeros((rows, PIXELS, PIXELS, FRAMES), np.uint8)
+        size = len(self.prepare(observe).labels)
+        flat, game = np.zeros((rows, size), np.float32), self.scenario
+        if game.goals == "flat" or not isinstance(game, GoalScenario):
+            return flat
+        shape = (rows, len(game.goal_bounds))
+        goals = {n: np.zeros(shape, np.float32) for n in GOALS}
+        return {"observation": flat, **goals}
+
     def take(self, shown: Sink, seats: Array) -> Observation:
         """Return the observations of some seats from those of all, used up."""
         if len(seats) != len(self.scenario.scene.seats):
@@ -125,11 +144,8 @@ class Observer:
         game = self.scenario
         shown = {"flat": layout.read(EgoView(state, memory, history, layout.scope))}
         if game.goals == "dict" and isinstance(game, GoalScenario):
-            goals = {
-                "achieved_goal": game.achieved(state, memory),
-                "desired_goal": game.desired(memory),
-            }
-            for name, goal in goals.items():
+            goals = game.achieved(state, memory), game.desired(memory)
+            for name, goal in zip(GOALS, goals, strict=True):
                 shown[name] = goal[..., None, :].astype(np.float32)
         return shown
 

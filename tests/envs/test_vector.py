@@ -80,5 +80,5 @@ def test_sb3_wrappers_seeds_and_saving(tmp_path):
     first, second = (next(m.policy.parameters()).detach().numpy() for m in models)
     np.testing.assert_array_equal(first, second)
     models[0].save(tmp_path / "model.zip")
-    policy = ah.load_policy(tmp_path / "model.zip")
+    policy = ah.load_policy(tmp_path / "model.zip", trust=True)
     assert policy.shape == (12,)

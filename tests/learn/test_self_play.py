@@ -63,7 +63,7 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     assert len(list((folder / "pool").glob("*.npz"))) == 2
     past = sorted((folder / "checkpoints").glob("*.npz"))
     assert len(past) >= 2
-    policy, old = load_policy(folder / "last.zip"), load_policy(past[-1])
+    policy, old = load_policy(folder / "last.npz"), load_policy(past[-1])
     world = ah.make_world("duel", 8, backend="numba")
     seen = world.reset(0)[:, 0]
     same = policy.predict(seen, True), old.predict(seen, True)

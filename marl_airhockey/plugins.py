@@ -1,0 +1,134 @@
+"""Scenarios and drivers from outside: files, modules and installed packages.
+
+A text that names code, ``my_task.py``, ``my_task.py:Task`` or ``package.module:Task``,
+is run because somebody wrote it there; nothing here looks into files for such texts.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+
+def plugins(kind: str) -> dict[str, EntryPoint]:
+    """Return entry points of installed packages by name, none of them loaded.
+
+    Args:
+        kind: "scenarios" or "drivers", the end of the group ``marl_airhockey.<kind>``.
+    """
+    return {e.name: e for e in entry_points(group=f"marl_airhockey.{kind}")}
+
+
+def load_plugin(entry: EntryPoint) -> Any:
+    """Return what an entry point names, a class or a function that makes an object.
+
+    Raises:
+        ValueError: it cannot be imported.
+    """
+    try:
+        return entry.load()
+    except Exception as error:
+        raise ValueError(_failed(f"{entry.name} ({entry.value})", error)) from error
+
+
+def names_code(text: str) -> bool:
+    """Return True if a text names a Python file, or something in a module there is."""
+    place, _, name = text.partition(":")
+    if place.endswith(".py"):
+        return True
+    parts = place.split(".")
+    if not all(part.isidentifier() for part in (*parts, name)):
+        return False
+    with _here():
+        return importlib.util.find_spec(parts[0]) is not None
+
+
+def load_code(text: str, base: type) -> Any:
+    """Return the class, function or object that a text names.
+
+    Args:
+        text: ``FILE.py``, ``FILE.py:NAME`` or ``package.module:NAME``. Without a name,
+            it is the file's ``make``, or the only class of its own below ``base``.
+        base: class that a file's class must be below.
+
+    Raises:
+        ValueError: no such file, module or name, or one that fails to import.
+    """
+    place, _, name = text.partition(":")
+    module = _file(Path(place)) if place.endswith(".py") else _module(place)
+    if name:
+        if not hasattr(module, name):
+            raise ValueError(f"{place}: it has no {name!r}")
+        return getattr(module, name)
+    if hasattr(module, "make"):
+        return module.make
+    found = [
+        value
+        for value in vars(module).values()
+        if inspect.isclass(value)
+        and issubclass(value, base)
+        and value.__module__ == module.__name__
+    ]
+    if len(found) != 1:
+        names = ", ".join(value.__name__ for value in found) or "none"
+        raise ValueError(
+            f"{place}: expected one class below {base.__name__}, found {names}; say "
+            f"which, {place}:NAME"
+        )
+    return found[0]
+
+
+def _file(path: Path) -> ModuleType:
+    path = path.expanduser().resolve()
+    if not path.is_file():
+        raise ValueError(f"{path}: there is no such file")
+    loaded = sys.modules.get(path.stem)
+    if loaded is not None:
+        if getattr(loaded, "__file__", None) == str(path):
+            return loaded
+        raise ValueError(
+            f"{path}: a module named {path.stem!r} is loaded already; rename the file"
+        )
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Dataclasses and pickles look their module up by its name.
+    sys.modules[path.stem] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[path.stem]
+        raise ValueError(_failed(str(path), error)) from error
+    return module
+
+
+def _module(name: str) -> ModuleType:
+    try:
+        with _here():
+            return importlib.import_module(name)
+    except Exception as error:
+        raise ValueError(_failed(name, error)) from error
+
+
+@contextmanager
+def _here() -> Iterator[None]:
+    """Find modules of the folder where one works, too, as `python -m` does."""
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        yield
+    finally:
+        sys.path.remove(here)
+
+
+def _failed(what: str, error: Exception) -> str:
+    return f"{what}: it cannot be imported: {type(error).__name__}: {error}"

@@ -1,0 +1,162 @@
+"""Players of your own as drivers: functions, models with ``predict``, torch modules."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.toolkit.policies import Policy
+from marl_airhockey.types import Array
+
+
+@dataclass
+class OwnPolicy(Policy):
+    """Policy from outside: it takes a batch of observations or one at a time.
+
+    Which of both is found out by asking it for the actions of three observations of
+    zeros and, should it refuse, of one.
+    """
+
+    one_by_one: bool = False
+    """True if it takes one observation at a time"""
+
+    def check(self, observation: Any) -> None:
+        shape = _shape(observation)
+        many = _ask(self.predict, observation)
+        if isinstance(many, np.ndarray) and many.shape == (shape[0], 2):
+            self.one_by_one = False
+            return
+        one = _ask(self.predict, _row(observation, 0))
+        if isinstance(one, np.ndarray) and one.shape == (2,):
+            self.one_by_one = True
+            return
+        raise ValueError(
+            f"{self.source} is no player of this environment: for observations of "
+            f"shape {shape} it gave {_told(many)}, for one of them {_told(one)}; "
+            f"expected actions of shape ({shape[0]}, 2) or (2,)"
+        )
+
+    def _actions(self, observation: Any) -> Array:
+        if not self.one_by_one:
+            return super()._actions(observation)
+        count = _shape(observation)[0]
+        rows = [self.predict(_row(observation, k), True) for k in range(count)]
+        return np.array(rows, np.float64).reshape(count, 2)
+
+
+def driver_of(player: object) -> Driver:
+    """Return a player of any kind as a driver.
+
+    Args:
+        player: a `Driver` or a class of drivers; a torch module or a function from
+            observations (B, D) to actions (B, 2), or from one (D,) to (2,); an object
+            with ``predict(observation, deterministic=True)``, as the models of
+            stable-baselines3 have, or ``predict(observation)``.
+
+    Raises:
+        ValueError: none of these.
+    """
+    if isinstance(player, Driver):
+        return player
+    if isinstance(player, type) and issubclass(player, Driver):
+        return player()
+    source = getattr(player, "__name__", type(player).__name__)
+    torch = sys.modules.get("torch")
+    if torch is not None and isinstance(player, torch.nn.Module):
+        return OwnPolicy(_Network(player), source=source)
+    if isinstance(player, type):
+        raise ValueError(
+            f"{source}: a class that is no Driver; give an object of it instead"
+        )
+    if callable(getattr(player, "predict", None)):
+        return OwnPolicy(_Model(player), source=source)
+    if callable(player):
+        return OwnPolicy(_Function(player), source=source)
+    raise ValueError(
+        f"{source} {player!r:.60} is no player: give a driver's name, the path of a "
+        "policy, a function from observation to action, an object with predict(), a "
+        "torch module or a Driver"
+    )
+
+
+@dataclass
+class _Function:
+    """Function of an observation alone."""
+
+    function: Callable[[Any], Any]
+
+    def __call__(self, observation: Any, deterministic: bool) -> Array:
+        return np.asarray(self.function(observation))
+
+
+@dataclass
+class _Model:
+    """Object with ``predict``."""
+
+    model: Any
+
+    def __call__(self, observation: Any, deterministic: bool) -> Array:
+        try:
+            said = self.model.predict(observation, deterministic=deterministic)
+        except TypeError as error:
+            if "deterministic" not in str(error):
+                raise
+            said = self.model.predict(observation)
+        # stable-baselines3 gives the state of a recurrent network as well.
+        if isinstance(said, tuple):
+            said, state = said
+            if state is not None:
+                raise ValueError(
+                    "a recurrent policy keeps a state between steps; write a Driver "
+                    "whose memory holds it"
+                )
+        return np.asarray(said)
+
+
+@dataclass
+class _Network:
+    """Torch module."""
+
+    module: Any
+
+    def __call__(self, observation: Any, deterministic: bool) -> Array:
+        import torch
+
+        with torch.no_grad():
+            if isinstance(observation, Mapping):
+                given: Any = {k: torch.as_tensor(v) for k, v in observation.items()}
+            else:
+                given = torch.as_tensor(observation)
+            return np.asarray(self.module(given).cpu().numpy())
+
+
+def _ask(predict: Callable[[Any, bool], Array], observation: Any) -> Array | Exception:
+    """Return its answer, or the error that it raised."""
+    try:
+        return np.asarray(predict(observation, True))
+    except Exception as error:
+        return error
+
+
+def _told(answer: Array | Exception) -> str:
+    if isinstance(answer, np.ndarray):
+        return f"shape {answer.shape} of {answer.dtype}"
+    return f"{type(answer).__name__}: {answer}"
+
+
+def _row(observation: Any, k: int) -> Any:
+    if isinstance(observation, Mapping):
+        return {name: array[k] for name, array in observation.items()}
+    return observation[k]
+
+
+def _shape(observation: Any) -> tuple[int, ...]:
+    if isinstance(observation, Mapping):
+        observation = observation["observation"]
+    shape: tuple[int, ...] = observation.shape
+    return shape

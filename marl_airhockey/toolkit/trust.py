@@ -1,0 +1,45 @@
+"""Trust: files that hold pickled Python are opened after a yes alone.
+
+Whoever unpickles a file runs what its author wrote into it. The zips of
+stable-baselines3 are such files; .npz and .onnx files hold numbers.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+class Trust:
+    """Answer of this process to the question whether pickled code may run."""
+
+    answer: bool | None = None
+    """True: yes to all files; False: no to all; None: ask at a terminal, else no"""
+
+
+def require_trust(path: Path, given: bool | None = None) -> None:
+    """Ask, unless it is known, whether the code in a file may run.
+
+    Args:
+        path: of the file.
+        given: the answer for this file, if it is known.
+
+    Raises:
+        ValueError: no; nothing of the file has run.
+    """
+    answer = Trust.answer if given is None else given
+    if answer is None and sys.stdin.isatty() and sys.stderr.isatty():
+        print(
+            f"{path} holds pickled Python, which runs when it is loaded. Do you trust "
+            "where it comes from? [y/N] ",
+            end="",
+            file=sys.stderr,
+            flush=True,
+        )
+        answer = sys.stdin.readline().strip().lower() in ("y", "yes")
+    if not answer:
+        raise ValueError(
+            f"{path}: it holds pickled Python, which loading would run; if you trust "
+            "where it comes from, say --trust or load_policy(path, trust=True); else "
+            "take an .npz or .onnx file"
+        )
