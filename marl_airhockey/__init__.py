@@ -9,6 +9,7 @@ if not (_here / "scenarios").is_dir():
     __path__.append(str(_here.parent))
 
 from marl_airhockey.envs.registration import register_all  # noqa: E402
+from marl_airhockey.experiment import evaluate, league, train  # noqa: E402
 from marl_airhockey.make import (  # noqa: E402
     env,
     make_sb3_vec,
@@ -33,6 +34,8 @@ __all__ = [
     "agent_names",
     "backend_names",
     "env",
+    "evaluate",
+    "league",
     "load_policy",
     "make_agent",
     "make_sb3_vec",
@@ -41,6 +44,7 @@ __all__ = [
     "make_world",
     "parallel_env",
     "scenario_names",
+    "train",
 ]
 
 

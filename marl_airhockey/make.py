@@ -57,12 +57,12 @@ def env(
 
 
 def make_vec(
-    scenario: str | Scenario, num_envs: int = 1, **keywords: Unpack[Keywords]
+    scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> AirHockeyVectorEnv:
     """Build a gymnasium VectorEnv of a scenario with one open seat."""
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
 
-    return AirHockeyVectorEnv(scenario, num_envs, **keywords)
+    return AirHockeyVectorEnv(scenario, num_worlds, **keywords)
 
 
 def make_sb3_vec(

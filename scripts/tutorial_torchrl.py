@@ -9,11 +9,10 @@ world at a time: take it for its algorithms (and BenchMARL's), not for speed.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import torch
 import typer
-from pettingzoo.utils import BaseParallelWrapper
 from tensordict.nn import TensorDictModule
 from tensordict.nn.distributions import NormalParamExtractor
 from torch import nn
@@ -48,20 +47,11 @@ class StateCritic(nn.Module):
         return value[..., None, :].expand(*value.shape[:-1], self.agents, 1)
 
 
-class WithoutInfos(BaseParallelWrapper[Any, Any, Any]):  # type: ignore[misc]
-    """Wrapper that empties infos: TorchRL makes tensors of them, ours hold names."""
-
-    def reset(self, seed: int | None = None, options: Any = None) -> Any:
-        """Reset the environment; return observations and empty infos."""
-        seen, infos = self.env.reset(seed, options)
-        return seen, {agent: {} for agent in infos}
-
-
 def make_rally() -> TransformedEnv:
     """Return a rally as TorchRL needs it, with the return of episodes."""
-    raw = ah.parallel_env("rally", backend="numba")
+    raw = ah.parallel_env("rally")
     env = PettingZooWrapper(
-        WithoutInfos(raw),
+        raw,
         return_state=True,
         group_map=raw.group_map,
         use_mask=False,

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import typer
 
+from marl_airhockey import __version__
 from marl_airhockey.cli import (
     bench,
     evaluate,
@@ -15,12 +17,20 @@ from marl_airhockey.cli import (
     study,
     train,
     transfer,
+    warm,
     watch,
 )
 from marl_airhockey.cli.options import app
 
+
+def _tell_version(given: bool) -> None:
+    if given:
+        print(f"marl_airhockey {__version__}")
+        raise typer.Exit
+
+
 # Importing these modules adds their commands to the application.
-__all__ = ["bench", "evaluate", "listing", "main", "train", "watch"]
+__all__ = ["bench", "evaluate", "listing", "main", "train", "warm", "watch"]
 app.command()(league.league)
 app.command()(play.play)
 app.command()(transfer.transfer)
@@ -29,6 +39,21 @@ record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
 record.command()(play.report)
 app.add_typer(record, name="record")
 app.add_typer(study.study, name="study")
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            help="Print the version.",
+            callback=_tell_version,
+            is_eager=True,
+        ),
+    ] = False,
+) -> None:
+    """Air hockey for robot learning and multi-agent RL."""
 
 
 def main() -> None:

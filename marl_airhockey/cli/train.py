@@ -27,6 +27,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.physics import load_physics
+from marl_airhockey.registry import find_scenario
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.config import TrainConfig
@@ -65,7 +66,7 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
-    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.config import load_config, preset
 
     given = {
         "physics": load_physics(physics) if physics is not None else None,
@@ -79,7 +80,8 @@ def train(
     if resume is not None:
         if given or any((scenario, change, option, other, out)):
             raise ValueError("--resume goes on as the run was begun: give nothing else")
-        _train(None, resume, scenario, as_json)
+        config = load_config(resume / "config.toml")
+        _train(None, resume, config.scenario, as_json)
         return
     changes = settings(change) | {
         "seed": seed,
@@ -89,8 +91,9 @@ def train(
         "drivers": settings(other),
         **given,
     }
-    folder = out or Path("runs") / f"{scenario}-{seed}"
-    _train(preset(scenario, changes), folder, scenario, as_json)
+    config = preset(scenario, changes)
+    folder = out or Path("runs") / f"{find_scenario(scenario).name}-{seed}"
+    _train(config, folder, scenario, as_json)
 
 
 def _train(
@@ -106,8 +109,7 @@ def _train(
         f"{folder}: {measure} {row[measure]:.3f} after {row['steps']:,.0f} steps "
         f"and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
     )
-    name = scenario or "SCENARIO"
-    console.print(f"next: airhockey evaluate {folder} --scenario {name}")
+    console.print(f"next: airhockey evaluate {folder} --scenario {scenario}")
 
 
 @app.command()

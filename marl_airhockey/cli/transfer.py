@@ -24,7 +24,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.physics import PARAMETERS, PROFILES, load_physics
 from marl_airhockey.core.table import TABLES
-from marl_airhockey.registry import find_backend, make_agent, make_scenario
+from marl_airhockey.registry import find_backend, find_scenario, make_agent
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def transfer(
     # Everything that may be wrong is checked before anything takes time.
     backends, profiles = _list(to), _list(profile)
     _check_names(backends, profiles)
-    make_scenario(scenario, **settings(option))
+    find_scenario(scenario, **settings(option))
     policies = _policies(scenario, policy or [], fine_tune, seed, folder)
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)

@@ -46,7 +46,7 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         self.action_space = self.parallel.action_space(self.agent)
 
     @property
-    def labels(self) -> tuple[str, ...]:
+    def observation_labels(self) -> tuple[str, ...]:
         """Name of each element of the (flat part of the) observation."""
         return self.parallel.observation_labels(self.agent)
 

@@ -74,6 +74,11 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         self._ended = np.zeros(num_envs, np.bool_)
 
     @property
+    def observation_labels(self) -> tuple[str, ...]:
+        """Name of each element of the (flat part of a single) observation."""
+        return self.world.observer.layout.labels
+
+    @property
     def physics(self) -> dict[str, Array]:
         """Physical parameters of the episodes by name, (B,); copies."""
         physics = self.world.episode.physics

@@ -16,6 +16,7 @@ from marl_airhockey.envs.spaces import (
     action_space,
     global_state,
     observation_space,
+    state_labels,
     state_space,
 )
 from marl_airhockey.types import Array, Memory
@@ -123,6 +124,11 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         """Return the name of each element of the (flat part of the) observation."""
         self._observation_spaces[agent]
         return self.world.observer.layout.labels
+
+    @property
+    def state_labels(self) -> tuple[str, ...]:
+        """Name of each element of `state`."""
+        return state_labels(self.world)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

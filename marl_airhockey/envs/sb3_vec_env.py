@@ -54,6 +54,11 @@ class AirHockeyVecEnv(VecEnv):
         fps: Any = round(1 / self.world.control_dt)
         self.metadata["render_fps"] = fps
 
+    @property
+    def observation_labels(self) -> tuple[str, ...]:
+        """Name of each element of the (flat part of a slot's) observation."""
+        return self.world.observer.layout.labels
+
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Give world i the seed + i at the next reset."""
         if seed is not None:

@@ -43,6 +43,15 @@ def state_space(world: World) -> spaces.Box:
     return spaces.Box(low, high, dtype=np.float32)
 
 
+def state_labels(world: World) -> tuple[str, ...]:
+    """Return the name of each element of `global_state`."""
+    bodies = world.scene.bodies
+    kinds = ("paddle", bodies.paddles), ("puck", bodies.pucks), ("block", bodies.blocks)
+    names = [f"{kind}_{i}" for kind, count in kinds for i in range(count)]
+    columns = [f"{name}.{x}" for name in names for x in ("x", "y", "vx", "vy")]
+    return (*columns, "time")
+
+
 def global_state(world: World) -> Array:
     """(B, 4 movers + 1) float32, table frame, of the true state."""
     state, movers = world.state, world.scene.bodies.movers

@@ -13,6 +13,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm
+from marl_airhockey.registry import DEFAULT_BACKEND
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world, scenario_of
 from marl_airhockey.world.step_result import StepResult
@@ -118,7 +119,7 @@ def evaluate(
     result = EvaluationResult(
         driver=name,
         scenario=world.scenario.name,
-        backend=keywords.get("backend", "pymunk"),
+        backend=keywords.get("backend", DEFAULT_BACKEND),
         profile=keywords.get("profile", "ideal"),
         episodes=episodes,
         success=success,

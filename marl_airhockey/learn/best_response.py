@@ -9,7 +9,7 @@ import numpy as np
 from marl_airhockey.evaluation.games import play_games
 from marl_airhockey.learn.config import load_config, preset
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_agent, make_scenario
+from marl_airhockey.registry import find_scenario, make_agent
 from marl_airhockey.toolkit.policies import load_policy
 
 GAMES = 400
@@ -37,7 +37,7 @@ def best_response(
     Raises:
         ValueError: the folder holds a run of an older version.
     """
-    seats = make_scenario(scenario).scene.seats
+    seats = find_scenario(scenario).scene.seats
     opponents = [i for i, seat in enumerate(seats) if seat.team != seats[0].team]
     drivers = {f"paddle_{i}": player for i in opponents}
     if (folder / "last.zip").exists():

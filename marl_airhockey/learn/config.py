@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.registry import make_scenario, scenario_names
+from marl_airhockey.registry import find_scenario
 from marl_airhockey.toolkit.policies import RUN_FORMAT, check_run_format
 from marl_airhockey.world.build import Keywords
 
@@ -153,7 +153,7 @@ class TrainConfig:
 
     @cached_property
     def _open_teams(self) -> list[int]:
-        seats = enumerate(make_scenario(self.scenario, **self.options).scene.seats)
+        seats = enumerate(find_scenario(self.scenario, **self.options).scene.seats)
         return [s.team for i, s in seats if f"paddle_{i}" not in self.drivers]
 
     @property
@@ -203,15 +203,14 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     Raises:
         ValueError: an unknown scenario or field, or a bad value.
     """
-    if scenario not in scenario_names():
-        raise ValueError(unknown_name("scenario", scenario, scenario_names()))
+    game = find_scenario(scenario, **(changes or {}).get("options", {}))
     text = resources.files(__package__).joinpath("presets.toml").read_text()
     presets = tomllib.loads(text)
     known = [f.name for f in fields(TrainConfig)]
     for name in changes or {}:
         if name not in known:
             raise ValueError(unknown_name("setting", name, known))
-    merged = {**presets["defaults"], **presets.get(scenario, {})}
+    merged = {**presets["defaults"], **presets.get(game.name, {})}
     robot = {"observe": "history", **merged.pop("robot", {})}
     merged |= robot if (changes or {}).get("profile") == "robot" else {}
     merged |= changes or {}

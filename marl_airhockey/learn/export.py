@@ -14,7 +14,7 @@ from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
 from marl_airhockey.learn.run import Progress
-from marl_airhockey.registry import make_agent, make_scenario
+from marl_airhockey.registry import find_scenario, make_agent
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import Policy, policy_driver
 
@@ -42,7 +42,7 @@ def export_policy(run: Path, out: Path) -> NumpyPolicy:
     metrics = _games(policy, config) if config.self_play else _episodes(policy, config)
     card = {
         **last.card,
-        "version": make_scenario(config.scenario).version,
+        "version": find_scenario(config.scenario).version,
         "options": config.options,
         "profile": config.profile,
         "command": training_command(config),

@@ -45,12 +45,33 @@ def train(
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()
-    if not (folder / "config.toml").exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "config.toml").write_text(config.to_toml())
-        (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
+    if (folder / "config.toml").exists():
+        return _go_on(engine, TrainingRun(config, folder, report))
+    before = set(folder.rglob("*"))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "config.toml").write_text(config.to_toml())
+    (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
     run = TrainingRun(config, folder, report)
+    try:
+        return _go_on(engine, run)
+    except BaseException:
+        # A run that fails to start leaves nothing behind that it has made.
+        if run.progress.steps == 0:
+            _remove(folder, before)
+        raise
+
+
+def _go_on(engine: Engine, run: TrainingRun) -> Metrics:
     return engine(run) if run.steps_left > 0 else run.latest
+
+
+def _remove(folder: Path, kept: set[Path]) -> None:
+    """Remove what is in a folder but was not before, and the folder if it is empty."""
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path not in kept:
+            path.rmdir() if path.is_dir() else path.unlink()
+    if not any(folder.iterdir()):
+        folder.rmdir()
 
 
 Engine = Callable[[TrainingRun], Metrics]
@@ -76,7 +97,7 @@ ENGINES: dict[str, Callable[[], Engine]] = {"sb3": _sb3, "rllib": _rllib}
 
 
 def versions() -> dict[str, str]:
-    """Return versions of all that a result may depend on, and a checkout's git hash."""
+    """Return versions of all that a result may depend on; a checkout's git hash."""
     names = ("marl_airhockey", "numpy", "gymnasium", "pettingzoo", "pymunk", "torch")
     found = {"python": platform.python_version()}
     for name in (*names, "stable_baselines3"):
@@ -90,5 +111,5 @@ def versions() -> dict[str, str]:
         done = subprocess.run(head, capture_output=True, text=True, check=True)
         found["git"] = done.stdout.strip()
     except (OSError, subprocess.CalledProcessError):
-        found["git"] = "unknown"
+        pass  # The version of the package says it all.
     return found

@@ -4,7 +4,12 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
-from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
+from gymnasium.wrappers.vector import (
+    NormalizeObservation,
+    RecordEpisodeStatistics,
+    RecordVideo,
+)
+from stable_baselines3.common.vec_env import VecVideoRecorder
 
 import marl_airhockey as ah
 
@@ -132,3 +137,23 @@ def test_torchrl_takes_every_scenario_as_it_is(scenario):
     pettingzoo = pytest.importorskip("torchrl.envs.libs.pettingzoo")
     utils = pytest.importorskip("torchrl.envs.utils")
     utils.check_env_specs(pettingzoo.PettingZooWrapper(ah.parallel_env(scenario)))
+
+
+@pytest.mark.filterwarnings("ignore:.*Overwriting existing videos:UserWarning")
+def test_batches_are_filmed_by_the_wrappers_of_others(tmp_path):
+    many = ah.make_vec("reach", 4, render_mode="rgb_array", max_cycles=5)
+    many = RecordVideo(many, str(tmp_path / "a"), episode_trigger=lambda k: k == 0)
+    many.reset(seed=0)
+    for _ in range(6):
+        many.step(np.zeros((4, 2), np.float32))
+    many.close()
+    assert [path.suffix for path in (tmp_path / "a").iterdir()] == [".mp4"]
+    slots = ah.make_sb3_vec("duel", 2, render_mode="rgb_array")
+    folder = str(tmp_path / "b")
+    slots = VecVideoRecorder(slots, folder, lambda step: step == 0, video_length=5)
+    slots.reset()
+    for _ in range(6):
+        slots.step(np.zeros((4, 2), np.float32))
+    slots.close()
+    (film,) = (tmp_path / "b").iterdir()
+    assert film.stat().st_size > 1000

@@ -1,8 +1,9 @@
 """Open and driven seats as PettingZoo sees them."""
 
+import gymnasium
 import pytest
 from pair import Pair
-from pettingzoo.test import parallel_api_test
+from pettingzoo.test import max_cycles_test, parallel_api_test
 
 import marl_airhockey as ah
 
@@ -22,3 +23,29 @@ def test_a_driven_seat_makes_it_a_single_agent_environment():
     assert seen.shape == (4, len(env.observation_labels("paddle_1")))
     with pytest.raises(ValueError, match="needs exactly one"):
         ah.make_vec(Pair(), 4)
+
+
+def test_every_number_of_state_and_observation_has_a_name():
+    env = ah.parallel_env("duel")
+    env.reset(seed=0)
+    named = dict(zip(env.state_labels, env.state(), strict=True))
+    state, _ = env.get_state()
+    assert named["puck_0.vx"] == pytest.approx(state.puck_velocity[0, 0])
+    assert named["paddle_1.y"] == pytest.approx(state.paddle[1, 1])
+    labels = env.observation_labels("paddle_0")
+    assert ah.make_sb3_vec("duel", 2).observation_labels == labels
+    single, many = ah.parallel_env("reach"), ah.make_vec("reach", 2)
+    task = gymnasium.make("marl_airhockey/Reach-v0").unwrapped
+    own = single.observation_labels("paddle_0")
+    assert many.observation_labels == task.observation_labels == own
+    assert len(own) == task.observation_space.shape[0]
+
+
+def test_games_are_imported_as_those_of_pettingzoo():
+    from marl_airhockey import duel_v0
+
+    assert duel_v0.parallel_env(max_cycles=7).max_cycles == 7
+    max_cycles_test(duel_v0)
+    with pytest.raises(ImportError, match="plays duel_v0"):
+        from marl_airhockey import duel_v7  # noqa: F401
+    assert not hasattr(ah, "duell_v0")

@@ -59,7 +59,7 @@ def test_a_run_leaves_all_that_is_needed(touch_run):
     assert any("tfevents" in name for name in names)
     versions = json.loads((touch_run / "versions.json").read_text())
     assert versions["torch"] == torch.__version__
-    assert versions["git"]
+    assert versions["marl_airhockey"]
     table = rows(touch_run)
     assert int(table[-1]["steps"]) == 98_304
     with (touch_run / "progress.csv").open() as file:
@@ -116,3 +116,15 @@ def test_presets_learn_their_tasks(task, tmp_path):
     assert isinstance(config, TrainConfig)
     row = train(config, tmp_path / task)
     assert row["success"] >= 0.9
+
+
+def test_a_run_that_fails_to_start_leaves_no_folder(tmp_path):
+    folder = tmp_path / "runs" / "touch"
+    with pytest.raises(ValueError, match="unknown driver"):
+        ah.train("duel", folder, drivers={"paddle_1": "nobody"}, total_steps=1000)
+    assert not folder.exists()
+    folder.mkdir(parents=True)
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match="unknown driver"):
+        ah.train("duel", folder, drivers={"paddle_1": "nobody"}, total_steps=1000)
+    assert [path.name for path in folder.iterdir()] == ["notes.txt"]
