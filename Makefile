@@ -1,5 +1,5 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all test-distributed lint docs clean
+.PHONY: help setup demo test test-one test-all test-distributed lint docs clean
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -29,6 +29,9 @@ demo: setup ## Train a paddle to juggle and show it (a minute)
 
 test: setup lint ## Run linters, types and the tests that are not slow
 	$(BIN)/pytest -m 'not slow'
+
+test-one: setup ## Run the tests of one scenario or driver: make test-one NAME=my_task
+	$(BIN)/pytest tests/suites -m 'not slow' --only $(NAME)
 
 test-all: setup lint ## Run every test
 	$(BIN)/pytest

@@ -131,7 +131,8 @@ def make_agent(player: object, **options: Any) -> Driver:
             (``allround:strength=fair,depth=0.05``); of a trained policy that comes with
             the library (``zoo/duel``); of an installed package's driver; the path of a
             policy's file or run folder; code, ``my_driver.py`` or
-            ``package.module:Class``; or an object, see `toolkit.players.driver_of`.
+            ``package.module:Class``, with options or not; or an object, see
+            `toolkit.players.driver_of`.
         **options: besides those in the name.
 
     Raises:
@@ -142,15 +143,17 @@ def make_agent(player: object, **options: Any) -> Driver:
     text, path = str(player), Path(player)
     short, _, given = text.partition(":")
     if short in {*agent_names(), *plugins("drivers")} or short.startswith("zoo/"):
-        options = dict(_option(part) for part in given.split(",") if part) | options
+        options = _options(given) | options
         if short.startswith("zoo/"):
             if short not in zoo_names():
                 raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
             short, options["path"] = "policy", ZOO / f"{short[4:]}.npz"
         make = _maker("driver", "agents", "drivers", short)
         return _driver(short, make, options)
-    if names_code(text):
-        return _driver(text, load_code(text, Driver), options)
+    code, _, given = text.rpartition(":") if "=" in text else (text, "", "")
+    if names_code(code):
+        options = _options(given) | options
+        return _driver(code, load_code(code, Driver), options)
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
         return make_agent("policy", path=path, **options)
     names = [*agent_names(), *plugin_names("drivers")]
@@ -169,6 +172,10 @@ def _driver(name: str, player: Any, options: Mapping[str, Any]) -> Driver:
     elif options:
         raise ValueError(f"options {sorted(options)}: {name} takes none")
     return driver_of(player)
+
+
+def _options(text: str) -> dict[str, str | float]:
+    return dict(_option(part) for part in text.split(",") if part)
 
 
 def _option(part: str) -> tuple[str, str | float]:

@@ -141,6 +141,11 @@ class FreeForAll(Scenario):
         )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        conceded: -1 for each life that the seat loses.
+        scored: 1 for the seat that touched the puck last when another loses a life.
+        """
         lost = t.memory["lives"] - t.new_memory["lives"]
         own = 1.0 + np.arange(self.sides)
         scored = (t.new_memory["scorer"] == own) & (lost.sum(-1, keepdims=True) > 0.0)

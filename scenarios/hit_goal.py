@@ -73,6 +73,13 @@ class HitGoal(GoalScenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        aim: 2 times the metres by which a struck puck came nearer to the goal.
+        success: 3 once.
+        drop: -1 when the puck passes the home line.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "aim": 2.0

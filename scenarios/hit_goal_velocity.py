@@ -98,6 +98,13 @@ class HitGoalVelocity(GoalScenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        score: 3 times the gain in the best score of place and velocity together.
+        success: 3 once.
+        drop: -1 when the puck passes the home line.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "score": 3.0 * (t.new_memory["score"] - t.memory["score"])[..., None],

@@ -69,6 +69,11 @@ class Juggle(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        hit: 1 for each hit that raises the puck by ``lift``.
+        drop: -2 when the puck is lost at home.
+        """
         return {
             "hit": (t.new_memory["hits"] - t.memory["hits"])[..., None],
             "drop": -2.0 * self.terminated(t)[..., None],

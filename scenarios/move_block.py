@@ -97,6 +97,14 @@ class MoveBlock(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        aim: 2 times the metres by which a struck puck came nearer to the block.
+        moved: 10 times the metres by which the block was moved further than before.
+        success: 3 once.
+        drop: -1 when the puck passes the home line.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "aim": 2.0

@@ -61,6 +61,13 @@ class PuckVelocity(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        rise: m/s by which the puck climbed faster than before.
+        success: 2 once.
+        drop: -1 when the puck passes the home line.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "rise": (t.new_memory["rise"] - t.memory["rise"])[..., None],

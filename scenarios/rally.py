@@ -89,6 +89,10 @@ class Rally(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        crossing: 1 for both when a returned puck crosses the middle line.
+        """
         counted = t.new_memory["crossings"] - t.memory["crossings"]
         return {"crossing": counted[..., None] * np.ones(2)}
 

@@ -74,6 +74,12 @@ class Reach(GoalScenario):
     observation = (observables.OwnPaddle(), observables.Goal((0.2, 0.2), -0.55, "own"))
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        progress: 2 times the metres by which the gap to the goal shrank.
+        time: -0.02 a step.
+        success: 2 once.
+        """
         return {
             "progress": 2.0 * (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "time": np.full((*t.after.time.shape, 1), -0.02),

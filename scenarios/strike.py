@@ -74,6 +74,13 @@ class Strike(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        speed: m/s by which the puck was faster than before.
+        time: -0.01 a step.
+        success: 2 once.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "speed": (t.new_memory["speed"] - t.memory["speed"])[..., None],

@@ -99,6 +99,15 @@ class StrikeCrowd(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        rise: half of the m/s by which the struck puck climbed faster than before.
+        spread: 4 times the metres by which the blocks, summed, are further from their
+        places than before.
+        time: -0.01 a step.
+        success: 3 once.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "rise": 0.5 * (t.new_memory["rise"] - t.memory["rise"])[..., None],

@@ -94,6 +94,10 @@ class TeamJuggle(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        pass: 1 for both when the puck, raised by one paddle, is raised by the other.
+        """
         passed = t.new_memory["passes"] - t.memory["passes"]
         return {"pass": passed[..., None] * np.ones(2)}
 

@@ -53,6 +53,12 @@ class Touch(Scenario):
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        approach: metres by which the paddle came nearer to the puck than before.
+        touch: 1 for each distinct touch.
+        drop: -1 when the puck passes the home line.
+        """
         return {
             "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
             "touch": 1.0 * (t.new_memory["touches"] - t.memory["touches"]).sum(-1),

@@ -1,6 +1,7 @@
 import importlib.util
 import os
 import shutil
+from typing import ClassVar
 
 import pytest
 
@@ -19,6 +20,27 @@ def seats(scenario):
 def ideal_backends():
     modules = {n: f"marl_airhockey.backends.{n}" for n in ah.backend_names()}
     return [n for n, m in modules.items() if importlib.import_module(m).make.ideal]
+
+
+def pytest_addoption(parser):
+    parser.addoption("--only", help="Run the tests of this scenario or driver alone.")
+
+
+def pytest_collection_modifyitems(config, items):
+    """With --only, keep what was made for that name."""
+    name = config.getoption("--only")
+    if name is None:
+        return
+    kept = [i for i in items if name in getattr(i, "callspec", _Plain).params.values()]
+    if not kept:
+        raise pytest.UsageError(f"--only {name}: no test is made for this name")
+    items[:] = kept
+
+
+class _Plain:
+    """Parameters of a test that has none."""
+
+    params: ClassVar[dict] = {}
 
 
 def pytest_generate_tests(metafunc):

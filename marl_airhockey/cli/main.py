@@ -13,6 +13,7 @@ from marl_airhockey.cli import (
     evaluate,
     league,
     listing,
+    new,
     play,
     study,
     train,
@@ -30,7 +31,7 @@ def _tell_version(given: bool) -> None:
 
 
 # Importing these modules adds their commands to the application.
-__all__ = ["bench", "evaluate", "listing", "main", "train", "warm", "watch"]
+__all__ = ["bench", "evaluate", "listing", "main", "new", "train", "warm", "watch"]
 app.command()(league.league)
 app.command()(play.play)
 app.command()(transfer.transfer)

@@ -178,7 +178,13 @@ class Scenario(ABC):
         return new
 
     def all_reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return all reward terms, the regularising ones too, (..., seats) each."""
+        """Return all reward terms, the regularising ones too, (..., seats) each.
+
+        goal: 1 while the goal is met, with goals="dict" instead of all others.
+        jitter: ``-jitter_weight`` times the squared change of the commanded velocity,
+        in top speeds.
+        turning: ``-turning_weight`` times the cost of a sudden change of direction.
+        """
         if self.goals == "dict":
             met = self.goal_met(t.after, t.new_memory)
             return {"goal": met[..., None].astype(np.float64)}

@@ -12,6 +12,7 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.envs.meanings import option_meanings, term_meanings
 from marl_airhockey.registry import (
     agent_names,
     backend_names,
@@ -65,6 +66,7 @@ def describe(name: str) -> dict[str, Any]:
     scenario = find_scenario(name)
     layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
     doc = (type(scenario).__doc__ or "").strip()
+    terms, options = term_meanings(type(scenario)), option_meanings(type(scenario))
     return {
         "name": name,
         "id": gymnasium_id(name) if name in scenario_names() else None,
@@ -85,9 +87,16 @@ def describe(name: str) -> dict[str, Any]:
                 layout.labels, layout.low, layout.high, strict=True
             )
         ],
-        "reward": [{"term": term} for term in reward_terms(scenario)],
+        "reward": [
+            {"term": term, "meaning": terms.get(term, "")}
+            for term in reward_terms(scenario)
+        ],
         "options": [
-            {"option": f.name, "default": getattr(scenario, f.name)}
+            {
+                "option": f.name,
+                "default": getattr(scenario, f.name),
+                "meaning": options.get(f.name, ""),
+            }
             for f in dataclasses.fields(scenario)
         ],
     }

@@ -208,10 +208,18 @@ def _announce(name: str) -> None:
     print(f"marl_airhockey: compiling {name}, once per machine", file=sys.stderr)
 
 
+CALLED = ("backends", "contracts", "core", "jit")
+"""Folders of all functions that compiled stages call: backends, and what they import."""
+
+
 @cache
 def package_hash() -> str:
-    """Return the hash of all sources of the package, a key of code that calls them."""
-    files = sorted(Path(__file__).parents[1].rglob("*.py"))
+    """Return the hash of the sources in `CALLED`, a key of code that calls them.
+
+    Others can change, say by a scenario more, without a minute of compiling.
+    """
+    package = Path(__file__).parents[1]
+    files = sorted(path for name in CALLED for path in (package / name).rglob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 

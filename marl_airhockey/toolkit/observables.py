@@ -275,5 +275,11 @@ class FromMemory(Observable):
         return [Column(name, self.low, self.high, self.unit) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        value = ego.memory[self.name][..., None, :]
+        kept, pucks = ego.memory[self.name], out.shape[-1]
+        if kept.ndim != out.ndim - 1 or kept.shape[-1] != pucks:
+            raise ValueError(
+                f"memory {self.name!r}: FromMemory shows a number for each puck, "
+                f"(..., {pucks}); it is {kept.shape}"
+            )
+        value = kept[..., None, :]
         out[...] = value - ego.own[..., :1] if self.from_own else value

@@ -37,7 +37,7 @@ class OwnPolicy(Policy):
             return
         raise ValueError(
             f"{self.source} is no player of this environment: for observations of "
-            f"shape {shape} it gave {_described(many)}, for one of them {_described(one)}; "
+            f"shape {shape} it gave {_text(many)}, for one of them {_text(one)}; "
             f"expected actions of shape ({shape[0]}, 2) or (2,)"
         )
 
@@ -143,7 +143,7 @@ def _ask(predict: Callable[[Any, bool], Array], observation: Any) -> Array | Exc
         return error
 
 
-def _described(answer: Array | Exception) -> str:
+def _text(answer: Array | Exception) -> str:
     if isinstance(answer, np.ndarray):
         return f"shape {answer.shape} of {answer.dtype}"
     return f"{type(answer).__name__}: {answer}"

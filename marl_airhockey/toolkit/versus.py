@@ -112,6 +112,10 @@ class Versus(Scenario):
         )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        goal: 1 for each goal of the seat's team, -1 for each of the other's.
+        """
         scored = t.new_memory["goals"] - t.memory["goals"]
         return {"goal": (scored - scored[..., ::-1])[..., self.teams]}
 

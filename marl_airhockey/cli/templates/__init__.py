@@ -1,0 +1,1 @@
+"""Templates that `airhockey new` copies: each is a whole example that runs."""

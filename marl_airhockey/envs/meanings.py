@@ -1,0 +1,67 @@
+"""Meanings of options and reward terms, read off the docstrings of a scenario."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator
+from itertools import pairwise
+
+from marl_airhockey.contracts.scenario import Scenario
+
+TERM = re.compile(r"^ *(\w+): (.+?)(?=\n *\w+: |\n\n|\Z)", re.MULTILINE | re.DOTALL)
+"""Line of a docstring, ``name: meaning``, and those that it goes on in."""
+
+
+def option_meanings(kind: type[Scenario]) -> dict[str, str]:
+    """Return the docstrings of a scenario's fields, by name."""
+    found: dict[str, str] = {}
+    for body in _bodies(kind):
+        for field, text in pairwise(body):
+            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+                # Without a docstring it is that of the class above.
+                name = field.target.id
+                found[name] = _docstring(text) or found.get(name, "")
+    return found
+
+
+def term_meanings(kind: type[Scenario]) -> dict[str, str]:
+    """Return the meanings of reward terms, by name.
+
+    They stand in the docstrings of `reward_terms` and `all_reward_terms`, as lines
+    ``name: meaning``.
+    """
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        for function in ("all_reward_terms", "reward_terms"):
+            if function in vars(base):
+                text = inspect.getdoc(vars(base)[function]) or ""
+                found |= {k: _one_line(v) for k, v in TERM.findall(text)}
+    return found
+
+
+def _bodies(kind: type) -> Iterator[list[ast.stmt]]:
+    """Yield the statements of the scenario's classes, the topmost first."""
+    for base in reversed(kind.__mro__):
+        if not issubclass(base, Scenario):
+            continue
+        try:
+            source = textwrap.dedent(inspect.getsource(base))
+        except OSError:
+            continue  # A class that was written at a prompt has no source.
+        (statement,) = ast.parse(source).body
+        assert isinstance(statement, ast.ClassDef)
+        yield statement.body
+
+
+def _docstring(statement: ast.stmt) -> str:
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    if isinstance(value, ast.Constant) and isinstance(value.value, str):
+        return _one_line(value.value)
+    return ""
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
