@@ -37,8 +37,9 @@ class ReachVelocity(GoalScenario):
     error: float = 0.10
     """Largest error of the velocity (m/s)."""
     slow: float = 0.2
+    """Lowest wanted speed at the goal (m/s)."""
     fast: float = 0.5
-    """Range of the wanted speed (m/s)."""
+    """Highest wanted speed at the goal (m/s)."""
     margin: float = 0.08
     """Least distance of a goal from every edge of the reach (m)."""
 

@@ -209,7 +209,7 @@ def _announce(name: str) -> None:
 
 
 CALLED = ("backends", "contracts", "core", "jit")
-"""Folders of all functions that compiled stages call: backends, and what they import."""
+"""Folders of the functions that compiled stages call: backends, what they import."""
 
 
 @cache

@@ -7,11 +7,12 @@ import sys
 import pytest
 
 import marl_airhockey as ah
+from marl_airhockey.envs.meanings import term_meanings
 
 
-def airhockey(*words, ok=True):
+def airhockey(*words, ok=True, cwd=None):
     command = [sys.executable, "-m", "marl_airhockey.cli", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd)
     assert (done.returncode == 0) == ok, done.stderr
     return done
 
@@ -31,6 +32,8 @@ def test_list_describes_one(scenario):
     assert labels == list(env.observation_labels("paddle_0"))
     assert data["reward"]
     assert data["what"]
+    for row in (*data["reward"], *data["options"]):
+        assert row["meaning"], f"{row} says nothing"
 
 
 def test_evaluate_prints_what_papers_need():
@@ -100,3 +103,64 @@ def test_bench_measures_and_draws(tmp_path):
         per_agent = rate["env_steps_per_cpu_s"] * rate["agents"]
         assert rate["agent_steps_per_cpu_s"] == per_agent > 0
     assert picture.stat().st_size > 10_000
+
+
+def test_it_tells_its_version():
+    assert airhockey("--version").stdout.split() == ["marl_airhockey", ah.__version__]
+
+
+def test_warm_compiles_and_says_so(tmp_path):
+    assert "reach" in airhockey("warm", "reach").stderr
+    done = airhockey("warm", "jugle", ok=False)
+    assert "unknown scenario 'jugle'" in done.stderr
+
+
+def test_a_new_scenario_and_a_new_driver_run(tmp_path):
+    for kind, name in (("scenario", "my_bank"), ("driver", "my_push")):
+        done = airhockey("new", kind, name, "--out", tmp_path)
+        assert f"{name}.py" in "".join(done.stdout.split())
+        again = airhockey("new", kind, name, "--out", tmp_path, ok=False)
+        assert "there is such a file" in again.stderr
+    words = ("-s", "my_bank.py", "--episodes", 20, "--backend", "numba", "--json")
+    done = airhockey("evaluate", "my_push.py:behind=0.1", *words, cwd=tmp_path)
+    data = json.loads(done.stdout)
+    assert data["return"] > data["beside"]["still"]["return"]
+    assert "3 once." in airhockey("list", "my_bank.py", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("scenario", "juggle"), "there is a scenario of this name"),
+        (("driver", "striker"), "there is a driver of this name"),
+        (("driver", "My-Push"), "expected a name like my_task"),
+        (("driver", "my_push", "--out", "nowhere"), "no such folder"),
+    ],
+)
+def test_a_name_that_cannot_be_new_is_refused(words, message, tmp_path):
+    assert message in airhockey("new", *words, ok=False, cwd=tmp_path).stderr
+
+
+def test_a_pickle_is_refused_unless_it_is_trusted(tmp_path):
+    from stable_baselines3 import PPO
+
+    model = PPO("MlpPolicy", ah.make_sb3_vec("reach", 2), n_steps=8, batch_size=16)
+    model.save(tmp_path / "model.zip")
+    words = ("evaluate", tmp_path / "model.zip", "-s", "reach", "--episodes", 2)
+    assert "--trust" in airhockey(*words, ok=False).stderr
+    assert "success" in airhockey(*words, "--trust", "--no-floors").stdout
+
+
+def test_meanings_are_those_of_the_nearest_class():
+    class Own(type(ah.make_scenario("touch"))):
+        def reward_terms(self, t):
+            """Return the terms.
+
+            touch: 5 for each touch,
+            even a late one.
+            """
+
+    meanings = term_meanings(Own)
+    assert meanings["touch"] == "5 for each touch, even a late one."
+    assert meanings["drop"] == "-1 when the puck passes the home line."
+    assert meanings["jitter"].startswith("``-jitter_weight``")
