@@ -16,7 +16,7 @@ import numpy as np
 
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
+from marl_airhockey.core.state import Bodies, State
 from marl_airhockey.types import Memory
 
 
@@ -31,8 +31,13 @@ def settled(state: State, scene: Scene, count: int) -> State:
         count: W.
 
     Raises:
-        ValueError: a field of a wrong shape or not finite, named.
+        ValueError: another scene, or a field of a wrong shape or not finite, named.
     """
+    if _counts(state.bodies) != _counts(scene.bodies):
+        raise ValueError(
+            f"state: it is of another scene, with {_counts(state.bodies)}; here there "
+            f"are {_counts(scene.bodies)}"
+        )
     rest = scene.still_state(count)
     fields: dict[str, Any] = {}
     for name in ("position", "velocity", "angle", "spin", "time"):
@@ -56,6 +61,12 @@ def settled(state: State, scene: Scene, count: int) -> State:
     touch = scene.table.paddle_radius + scene.table.puck_radius
     near = np.hypot(gap[..., 0], gap[..., 1]) < touch
     return replace(made, touching=near)
+
+
+def _counts(bodies: Bodies) -> str:
+    """Return how many bodies of each kind there are, in words."""
+    kinds = ("paddles", "pucks", "blocks", "obstacles")
+    return ", ".join(f"{getattr(bodies, kind)} {kind}" for kind in kinds)
 
 
 def checked_memory(memory: Memory, like: Memory, count: int) -> Memory:

@@ -74,6 +74,8 @@ class World:
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._state
         self._step: ControlStep | None = None
+        self.closed = False
+        """True after `close`"""
 
     @property
     def state(self) -> State:
@@ -117,8 +119,13 @@ class World:
     @property
     def _built(self) -> ControlStep:
         if self._step is None:
+            self._refuse_closed("step")
             raise RuntimeError("step: call reset() first; no episode is running")
         return self._step
+
+    def _refuse_closed(self, call: str) -> None:
+        if self.closed:
+            raise RuntimeError(f"{call}: this environment is closed; build another")
 
     @property
     def retired(self) -> Array | None:
@@ -152,6 +159,7 @@ class World:
         Args:
             seed: see `seed`; None goes on with the streams there are.
         """
+        self._refuse_closed("reset")
         if seed is not None or not self._seeded:
             self.seed(seed)
         self.reset_worlds(np.arange(self.num_worlds))
@@ -189,6 +197,7 @@ class World:
             ValueError: a wrong shape or a number that is not finite, named.
         """
         if self._step is None:
+            self._refuse_closed("set_state")
             raise RuntimeError("set_state: call reset() first, which draws the physics")
         worlds = np.arange(self.num_worlds) if worlds is None else np.asarray(worlds)
         rows = settled(state, self.scene, len(worlds))
@@ -287,7 +296,10 @@ class World:
             observer.renew(result.observation, *now, worlds)
 
     def close(self) -> None:
-        """Close the backend and leave the drivers."""
+        """Close the backend and leave the drivers; nothing can be played any more."""
+        if self.closed:
+            return
+        self.closed, self._step = True, None
         self.backend.close()
         for seat in self.driven:
             seat.driver.__exit__(None, None, None)

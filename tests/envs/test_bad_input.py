@@ -175,3 +175,32 @@ def test_a_missing_extra_is_one_line(monkeypatch):
     )
     with pytest.raises(RuntimeError, match=r"pip install 'marl_airhockey\[train\]'"):
         ah.make_sb3_vec("juggle")
+
+
+def test_a_closed_environment_is_closed(backend):
+    env = ah.parallel_env("juggle", backend=backend)
+    env.reset(seed=0)
+    state, _ = env.get_state()
+    env.close()
+    env.close()
+    for call in (
+        env.reset,
+        lambda: env.step({"paddle_0": np.zeros(2)}),
+        lambda: env.set_state(state),
+    ):
+        with pytest.raises(RuntimeError, match="this environment is closed"):
+            call()
+    many = ah.make_vec("juggle", 2)
+    many.reset(seed=0)
+    many.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        many.step(np.zeros((2, 2), np.float32))
+
+
+def test_a_state_of_another_scene_is_refused():
+    env, other = ah.parallel_env("juggle"), ah.parallel_env("duel")
+    for made in (env, other):
+        made.reset(seed=0)
+    message = "of another scene, with 2 paddles, 1 pucks.*here there are 1 paddles"
+    with pytest.raises(ValueError, match=message):
+        env.set_state(*other.get_state())
