@@ -7,8 +7,7 @@ from pathlib import Path
 from marl_airhockey.toolkit.policies import Policy, load_policy
 
 
-def make(
-    path: str | Path, deterministic: bool = True, trust: bool | None = None
-) -> Policy:
+def make(path: str | Path, deterministic: bool = True) -> Policy:
     """Load the policy; see `toolkit.policies.load_policy`."""
-    return load_policy(path, deterministic, trust)
+    # Whether its code is trusted is no option: names come from plans and configs, too.
+    return load_policy(path, deterministic)

@@ -12,6 +12,7 @@ from marl_airhockey.envs.registration import register_all  # noqa: E402
 from marl_airhockey.experiment import evaluate, league, train  # noqa: E402
 from marl_airhockey.make import (  # noqa: E402
     env,
+    gym_env,
     make_sb3_vec,
     make_vec,
     make_world,
@@ -35,6 +36,7 @@ __all__ = [
     "backend_names",
     "env",
     "evaluate",
+    "gym_env",
     "league",
     "load_policy",
     "make_agent",

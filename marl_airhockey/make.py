@@ -10,12 +10,14 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
 
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.errors import UnknownKeywordError, unknown_keyword
 from marl_airhockey.registry import make_scenario, scenario_names
 from marl_airhockey.world.world import World
 
 if TYPE_CHECKING:
     from pettingzoo.utils.env import AECEnv
 
+    from marl_airhockey.envs.gymnasium_env import AirHockeySingleEnv
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
@@ -56,12 +58,29 @@ def env(
     )
 
 
+def gym_env(
+    scenario: str | Scenario,
+    render_mode: str | None = None,
+    camera: str = "top",
+    **keywords: Unpack[Keywords],
+) -> AirHockeySingleEnv:
+    """Build a gymnasium Env of a scenario with one open seat, a task of one's own too.
+
+    ``gymnasium.make`` builds the same for the scenarios that come with the library.
+    """
+    from marl_airhockey.envs.gymnasium_env import make_single
+
+    return make_single(scenario, render_mode, camera, **keywords)
+
+
 def make_vec(
     scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> AirHockeyVectorEnv:
     """Build a gymnasium VectorEnv of a scenario with one open seat."""
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
 
+    if "num_envs" in keywords:
+        raise UnknownKeywordError(unknown_keyword("num_envs", ["num_worlds"]))
     return AirHockeyVectorEnv(scenario, num_worlds, **keywords)
 
 

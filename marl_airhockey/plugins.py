@@ -35,15 +35,15 @@ def load_plugin(entry: EntryPoint) -> Any:
     """
     try:
         return entry.load()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(_failed(f"{entry.name} ({entry.value})", error)) from error
 
 
 def names_code(text: str) -> bool:
     """Return True if a text names a Python file, or something in a module there is."""
-    place, _, name = text.partition(":")
+    place, colon, name = text.partition(":")
     if place.endswith(".py"):
-        return True
+        return not colon or name.isidentifier()
     parts = place.split(".")
     if not all(part.isidentifier() for part in (*parts, name)):
         return False
@@ -105,7 +105,7 @@ def _file(path: Path) -> ModuleType:
     sys.modules[path.stem] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[path.stem]
         raise ValueError(_failed(str(path), error)) from error
     return module
@@ -115,7 +115,7 @@ def _module(name: str) -> ModuleType:
     try:
         with _here():
             return importlib.import_module(name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(_failed(name, error)) from error
 
 
@@ -130,5 +130,5 @@ def _here() -> Iterator[None]:
         sys.path.remove(here)
 
 
-def _failed(what: str, error: Exception) -> str:
+def _failed(what: str, error: BaseException) -> str:
     return f"{what}: it cannot be imported: {type(error).__name__}: {error}"

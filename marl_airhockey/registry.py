@@ -141,21 +141,29 @@ def make_agent(player: object, **options: Any) -> Driver:
     if not isinstance(player, (str, Path)):
         return _driver(type(player).__name__, player, options)
     text, path = str(player), Path(player)
+    if isinstance(player, Path):  # A file, whatever its name looks like.
+        return _driver(
+            text,
+            _maker("driver", "agents", "drivers", "policy"),
+            {**options, "path": path},
+        )
     short, _, given = text.partition(":")
     if short in {*agent_names(), *plugins("drivers")} or short.startswith("zoo/"):
         options = _options(given) | options
         if short.startswith("zoo/"):
             if short not in zoo_names():
                 raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
+            if "path" in options:
+                raise ValueError(f"{text}: the path of a policy of the zoo is known")
             short, options["path"] = "policy", ZOO / f"{short[4:]}.npz"
         make = _maker("driver", "agents", "drivers", short)
         return _driver(short, make, options)
-    code, _, given = text.rpartition(":") if "=" in text else (text, "", "")
+    code, given = _split(text)
     if names_code(code):
         options = _options(given) | options
         return _driver(code, load_code(code, Driver), options)
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
-        return make_agent("policy", path=path, **options)
+        return make_agent(path, **options)
     names = [*agent_names(), *plugin_names("drivers")]
     raise ValueError(
         unknown_name("driver", text, names)
@@ -172,6 +180,17 @@ def _driver(name: str, player: Any, options: Mapping[str, Any]) -> Driver:
     elif options:
         raise ValueError(f"options {sorted(options)}: {name} takes none")
     return driver_of(player)
+
+
+def _split(text: str) -> tuple[str, str]:
+    """Return the name of a player without its options, and the options."""
+    head, _, tail = text.rpartition(":")
+    return (head, tail) if "=" in tail else (text, "")
+
+
+def runs_code(text: str) -> bool:
+    """Return True if `make_agent` or `find_scenario` would run code for a text."""
+    return names_code(text) or names_code(_split(text)[0])
 
 
 def _options(text: str) -> dict[str, str | float]:

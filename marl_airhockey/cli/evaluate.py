@@ -26,7 +26,7 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 from marl_airhockey.toolkit.policies import Policy
 
 FLOORS = ("still", "random", "sticky")
@@ -37,7 +37,7 @@ FLOORS = ("still", "random", "sticky")
 def evaluate_driver(
     driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
     scenario: Scenario,
-    backend: Backend = "pymunk",
+    backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     episodes: Annotated[int, typer.Option(help="How many.")] = 200,
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,

@@ -63,10 +63,11 @@ def league(
 ) -> None:
     """Let everybody play everybody: ratings, matrix, circles of wins."""
     require("matplotlib", "train")
-    names = list(players or ([] if folder else SCRIPTS))
-    names += find_policies(folder) if folder else []
+    given = players or ([] if folder else SCRIPTS)
+    entries = [*given, *(find_policies(folder) if folder else [])]
+    names = [str(entry) for entry in entries]
     keywords = environment(backend, profile, option, None)
-    entrants = {label(name, names): make_agent(name) for name in names}
+    entrants = {label(str(entry), names): make_agent(entry) for entry in entries}
     standings = play_league(scenario, entrants, games, keywords=keywords)
     files = standings.save(out)
     responses: dict[str, list[float]] = {}

@@ -83,6 +83,8 @@ def train(
         config = load_config(resume / "config.toml")
         _train(None, resume, config.scenario, as_json)
         return
+    if not scenario:
+        raise ValueError("say which SCENARIO to train, or --resume RUN")
     changes = settings(change) | {
         "seed": seed,
         "backend": backend,

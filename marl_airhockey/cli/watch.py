@@ -18,7 +18,7 @@ from marl_airhockey.cli.options import (
     console,
     environment,
 )
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 
 @app.command()
@@ -29,7 +29,7 @@ def watch(
     scenario: Annotated[
         str, typer.Option("--scenario", "-s", help="What the driver plays.")
     ] = "",
-    backend: Backend = "pymunk",
+    backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
     episodes: Annotated[int, typer.Option(help="How many.")] = 1,

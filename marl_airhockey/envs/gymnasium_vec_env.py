@@ -139,13 +139,17 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
 
         Raises:
             RuntimeError: with "Disabled", an episode has ended and was not reset.
+            ValueError: a wrong shape, or an element that is not finite.
         """
         if self._ended.any() and self._mode is AutoresetMode.DISABLED:
             raise RuntimeError(
                 "step: episodes have ended; call "
                 'reset(options={"reset_mask": terminated | truncated}) first'
             )
-        result = self.world.step(np.asarray(actions)[:, None])
+        given, shape = np.asarray(actions), (self.num_envs, 2)
+        if given.shape != shape:
+            raise ValueError(f"actions: expected shape {shape}, got {given.shape}")
+        result = self.world.step(given[:, None])
         begun = np.flatnonzero(self._ended)
         if len(begun):
             self._begin_anew(begun, result)

@@ -84,7 +84,10 @@ class AirHockeyVecEnv(VecEnv):
 
     def step_async(self, actions: Array) -> None:
         """Take the actions (slots, 2)."""
-        self._actions = np.asarray(actions).reshape(-1, self.seats, 2)
+        given, shape = np.asarray(actions), (self.num_envs, 2)
+        if given.shape != shape:
+            raise ValueError(f"actions: expected shape {shape}, got {given.shape}")
+        self._actions = given.reshape(-1, self.seats, 2)
 
     def step_wait(self) -> Any:
         """Move all worlds by one control step."""

@@ -49,7 +49,7 @@ def state_labels(world: World) -> tuple[str, ...]:
     kinds = ("paddle", bodies.paddles), ("puck", bodies.pucks), ("block", bodies.blocks)
     names = [f"{kind}_{i}" for kind, count in kinds for i in range(count)]
     columns = [f"{name}.{x}" for name in names for x in ("x", "y", "vx", "vy")]
-    return (*columns, "time")
+    return (*columns, "time_share")
 
 
 def global_state(world: World) -> Array:

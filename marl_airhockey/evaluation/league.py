@@ -43,7 +43,9 @@ def play_league(
     """
     names, count = tuple(players), len(players)
     if count < 2:
-        raise ValueError("a league needs at least two players")
+        raise ValueError("a league needs at least two players, of different names")
+    if games < 1:
+        raise ValueError(f"games: {games} must be at least 1")
     pairs = np.array(list(combinations(range(count), 2)))
     lineups = pairs.repeat(games, axis=0)
     swapped = np.arange(len(lineups)) % games >= games // 2
@@ -70,7 +72,7 @@ def play_league(
     return Standings(scenario, names, games, wins, draws, goals, ratings, spread)
 
 
-def find_policies(folder: Path) -> list[str]:
+def find_policies(folder: Path) -> list[Path]:
     """Return paths of the policies in a folder: runs of `train`, .npz and .onnx files.
 
     Raises:
@@ -84,7 +86,7 @@ def find_policies(folder: Path) -> list[str]:
         for path in sorted(folder.rglob(f"*.{kind}"))
         if not inside & set(path.parents)
     ]
-    found = [str(path) for path in (*sorted(inside), *files)]
+    found = [*sorted(inside), *files]
     if not found:
         raise ValueError(f"{folder}: no policies and no runs in it")
     return found

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.registry import find_scenario
+from marl_airhockey.registry import find_scenario, runs_code
 from marl_airhockey.toolkit.policies import RUN_FORMAT, check_run_format
+from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.world.build import Keywords
 
 # Not the goalkeeper as it stands: hardly anything gets past it, so that most games
@@ -203,9 +204,23 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     Raises:
         ValueError: an unknown scenario or field, or a bad value.
     """
+    if not isinstance(scenario, str):
+        raise ValueError(
+            "scenario: a run is resumed by its name; put the class into a "
+            'file and give "my_task.py", "my_task.py:Class" or "package.module:Class"'
+        )
+    place, colon, name = scenario.partition(":")
+    if place.endswith(".py"):  # A run goes on from any folder.
+        scenario = f"{Path(place).expanduser().resolve()}{colon}{name}"
     game = find_scenario(scenario, **(changes or {}).get("options", {}))
     text = resources.files(__package__).joinpath("presets.toml").read_text()
     presets = tomllib.loads(text)
+    for agent, driver in (changes or {}).get("drivers", {}).items():
+        if not isinstance(driver, str):
+            raise ValueError(
+                f"drivers: {agent}: a run is resumed by the names of its drivers; "
+                "give a name, a path or code such as my_driver.py"
+            )
     known = [f.name for f in fields(TrainConfig)]
     for name in changes or {}:
         if name not in known:
@@ -217,17 +232,28 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     return TrainConfig(**{**merged, "scenario": scenario})
 
 
+def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
+    """Ask before a configuration, maybe somebody else's, runs code that it names."""
+    named = [data.get("scenario", ""), *dict(data.get("drivers", {})).values()]
+    named += [*data.get("opponents", []), *data.get("rivals", [])]
+    found = [text for text in named if runs_code(str(text))]
+    if found:
+        require_trust(path, code=f"the name of Python code, {found[0]}")
+
+
 def load_config(path: Path) -> TrainConfig:
     """Read what `TrainConfig.to_toml` wrote.
 
     Raises:
-        ValueError: not such a file, or one of a run of another format.
+        ValueError: not such a file, one of a run of another format, or one that names
+            Python code and is not trusted.
     """
     try:
         data = tomllib.loads(path.read_text())
         found = data.pop("format", 1)
         if "scenario" in data:
             check_run_format(path.parent, found)
+        _refuse_code(path, data)
         return TrainConfig(**data)
     except (OSError, TypeError, tomllib.TOMLDecodeError) as error:
         raise ValueError(f"{path} is no training configuration: {error}") from error

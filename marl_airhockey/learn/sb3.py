@@ -19,6 +19,7 @@ from marl_airhockey.learn.network import FixedScale, policy_card
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.sb3_callback import AdaptiveRate, TrainingCallback
 from marl_airhockey.learn.self_play import make_training_env
+from marl_airhockey.toolkit.policies import load_weights
 
 
 def train_with_sb3(run: TrainingRun) -> Metrics:
@@ -75,7 +76,7 @@ def _take_weights(model: PPO, run: Path) -> None:
         raise ValueError(f"init: {run} is no folder of a run of sb3")
     if (run / "config.toml").exists():
         load_config(run / "config.toml")
-    weights = PPO.load(path, device="cpu").policy.state_dict()
+    weights = load_weights(path)
     try:
         model.policy.load_state_dict(weights)
     except RuntimeError as error:

@@ -41,7 +41,7 @@ def train(
     if config is None:
         config = load_config(folder / "config.toml")
     elif (folder / "config.toml").exists():
-        raise ValueError(f"{folder} holds a run already: use --resume, or another")
+        raise ValueError(f"{folder} holds a run already: resume it, or say another")
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()

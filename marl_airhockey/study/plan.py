@@ -9,7 +9,7 @@ from typing import Any
 
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON
-from marl_airhockey.plugins import names_code
+from marl_airhockey.registry import runs_code
 from marl_airhockey.study.orders import ORDERS
 
 EXAMPLE = Path(__file__).parent / "example.toml"
@@ -76,7 +76,7 @@ def refuse_code(name: str) -> None:
     Raises:
         ValueError: such a name.
     """
-    if names_code(name):
+    if runs_code(name):
         raise ValueError(
             f"{name}: a plan runs no code; name a driver or scenario of ours or of an "
             "installed package, or an .npz or .onnx file"

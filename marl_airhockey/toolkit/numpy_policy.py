@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from marl_airhockey.types import Array
 
 LARGEST = 64_000_000
 """Largest number of bytes that the arrays of a file may take."""
+MOST = 100
+"""Largest number of arrays in a file."""
 
 
 @dataclass(frozen=True)
@@ -77,29 +80,67 @@ class NumpyPolicy:
             ValueError: a file of another kind.
         """
         try:
-            _check_size(path)
-            with np.load(path, allow_pickle=False) as file:
-                count = sum(name.startswith("weight_") for name in file)
-                pairs = [(file[f"weight_{i}"], file[f"bias_{i}"]) for i in range(count)]
-                card = json.loads(str(file["card"]))
-                parts = file["centre"], file["unit"], file["log_std"]
-                return NumpyPolicy(pairs, *parts, card)
-        except (KeyError, OSError, ValueError, zipfile.BadZipFile) as error:
+            arrays = _read(path)
+            card = json.loads(str(arrays.pop("card")))
+            count = sum(name.startswith("weight_") for name in arrays)
+            pairs = [(arrays[f"weight_{i}"], arrays[f"bias_{i}"]) for i in range(count)]
+            parts = arrays["centre"], arrays["unit"], arrays["log_std"]
+            found = NumpyPolicy(pairs, *parts, card)
+            found._check()
+        except Exception as error:  # Whatever a broken or hostile file makes of it.
             raise ValueError(f"{path} is no policy of ours: {error}") from error
+        return found
+
+    def _check(self) -> None:
+        """Refuse layers that do not follow each other, and what is no number.
+
+        Raises:
+            ValueError: says what.
+        """
+        size = self.centre.size
+        if self.centre.shape != (size,) or self.unit.shape != (size,):
+            raise ValueError("centre and unit must be (D,)")
+        for weight, bias in self.layers:
+            if weight.shape != (len(bias), size) or bias.ndim != 1:
+                raise ValueError(f"a layer of {weight.shape} follows {size} numbers")
+            size = len(bias)
+        if size != 2 or self.log_std.shape != (2,) or not self.layers:
+            raise ValueError("its actions are not (2,)")
+        arrays = [self.centre, self.unit, self.log_std, *sum(self.layers, ())]
+        if not all(a.dtype.kind == "f" and np.isfinite(a).all() for a in arrays):
+            raise ValueError("every element must be a finite number")
+        observe = self.card.get("observe")
+        if (self.unit == 0.0).any() or not isinstance(observe, (str, type(None))):
+            raise ValueError("a unit is 0, or `observe` is no text")
 
 
-def _check_size(path: Path) -> None:
-    """Refuse a file whose arrays would take too much memory, before there are any.
+def _read(path: Path) -> dict[str, Array]:
+    """Read the arrays of an .npz, of numbers or text, with no more memory than that.
 
     Raises:
-        ValueError: such a file, or one that holds something else.
+        ValueError: too large, or something else than an array of numbers or text.
     """
-    total = 0
+    arrays: dict[str, Array] = {}
+    with path.open("rb") as file:
+        if file.read(4) != b"PK\x03\x04":
+            raise ValueError("it is no .npz")
     with zipfile.ZipFile(path) as archive:
-        for name in archive.namelist():
-            with archive.open(name) as file:
-                np.lib.format.read_magic(file)
-                shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-            total += math.prod(shape) * dtype.itemsize
-    if total > LARGEST:
-        raise ValueError(f"its arrays take {total:,} bytes, more than {LARGEST:,}")
+        members = archive.infolist()
+        total = sum(member.file_size for member in members)
+        if total > LARGEST or len(members) > MOST:
+            raise ValueError(f"{len(members)} arrays of {total:,} bytes are too much")
+        for member in members:
+            content = io.BytesIO(archive.read(member))
+            if np.lib.format.read_magic(content) != (1, 0):
+                raise ValueError(f"{member.filename}: another version of the format")
+            shape, fortran, dtype = np.lib.format.read_array_header_1_0(content)
+            rest = content.read()
+            if dtype.kind not in "fU" or min(shape, default=0) < 0:
+                raise ValueError(f"{member.filename}: {dtype} {shape}")
+            if math.prod(shape) * dtype.itemsize != len(rest):
+                raise ValueError(f"{member.filename}: {shape} in {len(rest)} bytes")
+            flat = np.frombuffer(rest, dtype)
+            order: Literal["F", "C"] = "F" if fortran else "C"
+            name = member.filename.removesuffix(".npy")
+            arrays[name] = flat.reshape(shape, order=order)
+    return arrays

@@ -176,14 +176,22 @@ def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPol
     return NumpyPolicy(pairs, centre, unit, log_std, card)
 
 
-def _load_weights(path: Path, card: Mapping[str, Any]) -> NumpyPolicy:
-    """Read a zip of our training without running anything in it."""
+def load_weights(path: Path) -> Mapping[str, Any]:
+    """Read the tensors of a zip of stable-baselines3, running nothing in it.
+
+    Raises:
+        ValueError: a zip that holds something else.
+    """
     import torch
 
-    with zipfile.ZipFile(path) as archive:
-        content = io.BytesIO(archive.read("policy.pth"))
-    weights = torch.load(content, map_location="cpu", weights_only=True)
-    return numpy_actor(weights, card)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            content = io.BytesIO(archive.read("policy.pth"))
+        found = torch.load(content, map_location="cpu", weights_only=True)
+        return dict(found)
+    except Exception as error:  # Whatever a broken or hostile file makes of it.
+        kind = type(error).__name__
+        raise ValueError(f"{path}: it holds no plain weights ({kind})") from error
 
 
 def _load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
@@ -198,7 +206,7 @@ def _load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
     if "card" in data:  # of our own training
         check_run_format(path, data["card"].get("run_format", 1))
         if data["card"].get("observe") != "pixels":
-            own = _load_weights(path, data["card"])
+            own = numpy_actor(load_weights(path), data["card"])
             return policy_driver(own, str(path), deterministic)
     require_trust(path, trust)
     import stable_baselines3 as sb3

@@ -17,12 +17,15 @@ class Trust:
     """True: yes to all files; False: no to all; None: ask at a terminal, else no"""
 
 
-def require_trust(path: Path, given: bool | None = None) -> None:
+def require_trust(
+    path: Path, given: bool | None = None, code: str = "pickled Python"
+) -> None:
     """Ask, unless it is known, whether the code in a file may run.
 
     Args:
         path: of the file.
         given: the answer for this file, if it is known.
+        code: what it is.
 
     Raises:
         ValueError: no; nothing of the file has run.
@@ -30,7 +33,7 @@ def require_trust(path: Path, given: bool | None = None) -> None:
     answer = Trust.answer if given is None else given
     if answer is None and sys.stdin.isatty() and sys.stderr.isatty():
         print(
-            f"{path} holds pickled Python, which runs when it is loaded. Do you trust "
+            f"{path} holds {code}, which runs when it is loaded. Do you trust "
             "where it comes from? [y/N] ",
             end="",
             file=sys.stderr,
@@ -39,7 +42,7 @@ def require_trust(path: Path, given: bool | None = None) -> None:
         answer = sys.stdin.readline().strip().lower() in ("y", "yes")
     if not answer:
         raise ValueError(
-            f"{path}: it holds pickled Python, which loading would run; if you trust "
-            "where it comes from, say --trust or load_policy(path, trust=True); else "
-            "take an .npz or .onnx file"
+            f"{path}: it holds {code}, which loading would run; if you trust where it "
+            "comes from, say --trust or load_policy(path, trust=True); else take an "
+            ".npz or .onnx file"
         )

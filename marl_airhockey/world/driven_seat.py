@@ -89,11 +89,14 @@ class DrivenSeat:
         view = self.view(sensed, memory, physics, worlds)
         kept = {name: value[worlds] for name, value in self._memory.items()}
         action, kept = self.driver.act(view, kept)
-        if action.shape != held.shape or not np.isfinite(action).all():
+        who = f"driver of paddle_{self.index} ({type(self.driver).__name__})"
+        if action.shape != held.shape:
             raise ValueError(
-                f"driver of paddle_{self.index}: act() must give finite numbers of "
-                f"shape {held.shape}, got {action.shape}"
+                f"{who}: act() must give numbers of shape {held.shape}, got "
+                f"{action.shape}"
             )
+        if not np.isfinite(action).all():
+            raise ValueError(f"{who}: act() gave nan or inf; numbers must be finite")
         for name, value in kept.items():
             self._memory[name][worlds] = value
         self._held[worlds] = np.where(due[:, None], action, held)

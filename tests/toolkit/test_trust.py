@@ -9,6 +9,8 @@ import pytest
 from stable_baselines3 import PPO
 
 import marl_airhockey as ah
+from marl_airhockey.evaluation.league import find_policies
+from marl_airhockey.learn.config import load_config
 from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import load_policy
@@ -94,5 +96,99 @@ def test_arrays_are_counted_before_they_are_allocated(tmp_path):
         archive.open("weight_0.npy", "w") as file,
     ):
         np.lib.format.write_array_header_1_0(file, header)
-    with pytest.raises(ValueError, match=r"no policy of ours: .*800,000,000,000 bytes"):
+    with pytest.raises(ValueError, match=r"no policy of ours: .*in 0 bytes"):
         NumpyPolicy.load(tmp_path / "big.npz")
+
+
+def written(path, **changes):
+    """Write a policy for reach with some arrays changed; None leaves one out."""
+    rng = np.random.default_rng(0)
+    arrays = {
+        "weight_0": rng.normal(size=(2, 8)),
+        "bias_0": np.zeros(2),
+        "centre": np.zeros(8),
+        "unit": np.ones(8),
+        "log_std": np.zeros(2),
+        "card": np.array(json.dumps({"observe": "velocity"})),
+    }
+    arrays |= changes
+    np.savez(path, **{k: v for k, v in arrays.items() if v is not None})
+    return path
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"weight_0": None, "bias_0": None},
+        {"bias_0": None},
+        {"weight_0": np.zeros((3, 8)), "bias_0": np.zeros(3)},
+        {"weight_0": np.zeros((2, 2, 8))},
+        {"weight_0": np.zeros((2, 7))},
+        {"weight_0": np.full((2, 8), np.nan)},
+        {"weight_0": np.full((2, 8), "text")},
+        {"unit": np.zeros(8)},
+        {"unit": np.ones(5)},
+        {"centre": np.array(0.0)},
+        {"log_std": np.zeros(5)},
+        {"log_std": np.zeros(2, complex)},
+        {"card": np.array("[")},
+        {"card": np.array("[" * 100_000)},
+        {"card": np.array("[]")},
+        {"card": np.array(json.dumps({"observe": ["x"]}))},
+        {f"extra_{i}": np.zeros(1) for i in range(200)},
+    ],
+)
+def test_what_is_no_policy_is_refused_when_it_is_read(changes, tmp_path):
+    assert load_policy(written(tmp_path / "good.npz")).shape == (8,)
+    with pytest.raises(ValueError, match="is no policy of ours"):
+        load_policy(written(tmp_path / "bad.npz", **changes))
+
+
+def test_broken_and_disguised_arrays_are_refused(tmp_path):
+    good = written(tmp_path / "good.npz").read_bytes()
+    header = b"\x93NUMPY\x02\x00"
+    for name, content in {
+        "prefix": np.lib.format.magic(1, 0) + good,
+        "cut": good[:-200],
+        "flipped": good[:60] + b"????" + good[64:],
+        "version": good.replace(b"\x93NUMPY\x01\x00", header, 1),
+    }.items():
+        path = tmp_path / f"{name}.npz"
+        path.write_bytes(content)
+        with pytest.raises(ValueError, match="is no policy of ours"):
+            load_policy(path)
+
+
+def test_names_cannot_say_that_they_are_trusted(trap):
+    path, sprung = trap
+    for name in (f"policy:path={path},trust=yes", f"policy:path={path}"):
+        with pytest.raises(ValueError, match=r"unknown option|pickled Python"):
+            make_agent(name)
+    assert not sprung.exists()
+
+
+def test_a_file_is_a_file_whatever_its_name_looks_like(trap, tmp_path):
+    path, sprung = trap
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "evil.py").write_text(f"open({str(sprung)!r}, 'w')")
+    for name in ("evil.py:x.npz", f"policy:path={path.name},trust=1,a=.npz"):
+        written(folder / name)
+    players = [make_agent(found) for found in find_policies(folder)]
+    assert [player.shape for player in players] == [(8,), (8,)]
+    assert not sprung.exists()
+
+
+def test_a_run_of_somebody_else_runs_no_code_unasked(touch_run, tmp_path):
+    evil, sprung = tmp_path / "evil.py", tmp_path / "sprung"
+    evil.write_text(f"open({str(sprung)!r}, 'w')")
+    text = (touch_run / "config.toml").read_text()
+    for old, new in (
+        ('scenario = "touch"', f'scenario = "{evil}"'),
+        ("[drivers]", f'[drivers]\npaddle_1 = "{evil}:Evil:x=1"'),
+    ):
+        assert old in text
+        (tmp_path / "config.toml").write_text(text.replace(old, new))
+        with pytest.raises(ValueError, match="the name of Python code"):
+            load_config(tmp_path / "config.toml")
+    assert not sprung.exists()

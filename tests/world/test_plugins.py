@@ -103,7 +103,7 @@ def test_code_that_is_no_scenario_is_refused(folder):
 
 
 def test_a_plan_of_a_study_runs_no_code(folder):
-    for name in ("my_driver.py", "my_driver:Push"):
+    for name in ("my_driver.py", "my_driver:Push", "my_driver:Push:share=1"):
         with pytest.raises(ValueError, match="runs no code"):
             Opponent(name)
 
