@@ -71,4 +71,4 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     text = (folder / "config.toml").read_text().replace("= 6144", "= 9216")
     (folder / "config.toml").write_text(text)
     assert train(None, folder)["steps"] > last["steps"]
-    assert find_policies(tmp_path) == [str(folder)]
+    assert find_policies(tmp_path) == [folder]
