@@ -118,6 +118,7 @@ def _train(
 def export(
     run: Annotated[Path, typer.Argument(help="Folder of a training run.")],
     out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
+    trust: Trusting = False,
 ) -> None:
     """Freeze a trained policy into one small file with a card, measured anew."""
     require("stable_baselines3", "train")

@@ -32,6 +32,11 @@ def what(scenario: Scenario) -> str:
     return text.strip().split("\n\n")[0]
 
 
+def _id(name: str) -> str | None:
+    """Return the gymnasium id of a scenario; None for one from outside."""
+    return gymnasium_id(name) if name in scenario_names() else None
+
+
 def summary() -> dict[str, Any]:
     """Return the names of all scenarios, drivers and backends.
 
@@ -50,7 +55,7 @@ def summary() -> dict[str, Any]:
                 "what": what(scenario),
                 "seats": len(scenario.scene.seats),
                 "seconds": scenario.seconds,
-                "id": gymnasium_id(name) if name in scenario_names() else None,
+                "id": _id(name),
             }
         )
     return {
@@ -69,7 +74,7 @@ def describe(name: str) -> dict[str, Any]:
     terms, options = term_meanings(type(scenario)), option_meanings(type(scenario))
     return {
         "name": name,
-        "id": gymnasium_id(name) if name in scenario_names() else None,
+        "id": _id(name),
         "what": what(scenario) + "\n" + " ".join(doc.split()),
         "seats": [
             {

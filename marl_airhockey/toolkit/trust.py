@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 
 class Trust:
@@ -15,6 +16,8 @@ class Trust:
 
     answer: bool | None = None
     """True: yes to all files; False: no to all; None: ask at a terminal, else no"""
+    granted: ClassVar[set[Path]] = set()
+    """Files that got a yes at a terminal, so that none is asked about twice"""
 
 
 def require_trust(
@@ -31,6 +34,8 @@ def require_trust(
         ValueError: no; nothing of the file has run.
     """
     answer = Trust.answer if given is None else given
+    if answer is None and path in Trust.granted:
+        return
     if answer is None and sys.stdin.isatty() and sys.stderr.isatty():
         print(
             f"{path} holds {code}, which runs when it is loaded. Do you trust "
@@ -40,9 +45,10 @@ def require_trust(
             flush=True,
         )
         answer = sys.stdin.readline().strip().lower() in ("y", "yes")
+        if answer:
+            Trust.granted.add(path)
     if not answer:
         raise ValueError(
-            f"{path}: it holds {code}, which loading would run; if you trust where it "
-            "comes from, say --trust or load_policy(path, trust=True); else take an "
-            ".npz or .onnx file"
+            f"{path}: it holds {code}, which loading would run; say --trust, or from "
+            "Python load_policy(path, trust=True), if you trust where it comes from"
         )

@@ -140,16 +140,17 @@ class World:
                 the system.
 
         Raises:
-            ValueError: not one number for each world.
+            ValueError: neither a whole number nor one for each world.
         """
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
-        if isinstance(seed, Sequence):
-            if len(seed) != self.num_worlds:
-                raise ValueError(f"seed: {len(seed)} for {self.num_worlds} worlds")
-            self.seeds = np.array(seed, np.int64)
-        else:
-            self.seeds = (np.arange(self.num_worlds) + seed).astype(np.int64)
+        b, given = self.num_worlds, np.asarray(seed)
+        if given.dtype.kind not in "iu" or given.shape not in ((), (b,)):
+            raise ValueError(
+                f"seed: {seed!r} is no whole number, nor one for each of {b}"
+            )
+        alone = given.ndim == 0
+        self.seeds = (given + np.arange(b) if alone else given).astype(np.int64)
         self._episode.number[:] = 0
         self._seeded = True
 

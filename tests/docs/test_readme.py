@@ -11,9 +11,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}-{k}")
     for page in PAGES
-    for k, block in enumerate(
-        re.findall(r"```python\n(.*?)```", page.read_text(), re.S)
-    )
+    for k, block in enumerate(re.findall(FENCE, page.read_text(), re.DOTALL))
 ]
 
 

@@ -204,3 +204,17 @@ def test_a_state_of_another_scene_is_refused():
     message = "of another scene, with 2 paddles, 1 pucks.*here there are 1 paddles"
     with pytest.raises(ValueError, match=message):
         env.set_state(*other.get_state())
+
+
+def test_seeds_are_one_number_or_one_for_each_world():
+    world = ah.make_world("reach", 3)
+    for seeds in ([5, 9, 2], np.array([5, 9, 2])):
+        world.reset(seeds)
+        assert world.seeds.tolist() == [5, 9, 2]
+    world.reset(7)
+    assert world.seeds.tolist() == [7, 8, 9]
+    for wrong in ("a", 1.5, [1, 2], np.zeros((3, 1), int)):
+        with pytest.raises(
+            ValueError, match="is no whole number, nor one for each of 3"
+        ):
+            world.reset(wrong)
