@@ -14,8 +14,8 @@ from operator import attrgetter
 from typing import Any
 
 import numpy as np
-from numba import literal_unroll, njit
 
+from marl_airhockey.core.rows import copy_rows
 from marl_airhockey.types import Array
 
 
@@ -165,7 +165,7 @@ class State:
             (x.reshape(count, -1), row.reshape(len(worlds), -1))
             for x, row in zip(_results(self), _results(rows), strict=True)
         ]
-        _copy_rows(worlds, tuple(pairs))
+        copy_rows(worlds, tuple(pairs))
         if self.path is not None:
             both = np.concatenate([rows.position, rows.velocity], -1)
             self.path[worlds] = both[:, None, : self.bodies.movers]
@@ -181,13 +181,3 @@ EVENTS = (
 RESULTS = ("position", "velocity", "angle", "spin", "time", *EVENTS)
 """Names of the fields that every step of every backend writes."""
 _results = attrgetter(*RESULTS)
-
-
-@njit(cache=True)
-def _copy_rows(worlds: Array, pairs: tuple[tuple[Array, Array], ...]) -> None:
-    """Copy rows (W, n) into those of some worlds (B, n), one array after the other."""
-    for pair in literal_unroll(pairs):
-        into, rows = pair
-        for i in range(len(worlds)):
-            for k in range(rows.shape[1]):
-                into[worlds[i], k] = rows[i, k]

@@ -8,6 +8,7 @@ import numpy as np
 
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.core.limits import INFINITE, Limited, limits_stage
+from marl_airhockey.core.rows import clear_rows
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.core.state import State
 from marl_airhockey.jit.pipeline import Pipeline
@@ -33,8 +34,8 @@ class Moment(NamedTuple):
 
     def begin(self, worlds: Array) -> None:
         """Begin to count anew in some worlds, by index, from paddles at rest."""
-        self.episode.begin(worlds)
-        self.limited.acceleration[worlds] = 0.0
+        counts = (*self.episode.running, self.limited.acceleration)
+        clear_rows(worlds, tuple(x.reshape(len(x), -1) for x in counts))
 
 
 class ControlStep:

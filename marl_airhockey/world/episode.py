@@ -68,7 +68,7 @@ class Episode:
             self.physics[name][worlds] = value
         return worlds
 
-    def begin(self, worlds: Array, cycles: Array | int = 0) -> None:
-        """Set the counters of some worlds, by index, to those of a new episode."""
-        self.cycles[worlds], self.returns[worlds] = cycles, 0.0
-        self.success[worlds], self.first_shot[worlds] = False, False
+    @property
+    def running(self) -> tuple[Array, ...]:
+        """Counters that begin at 0 with every episode."""
+        return self.cycles, self.returns, self.success, self.first_shot
