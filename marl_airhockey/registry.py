@@ -175,8 +175,14 @@ def _driver(name: str, player: Any, options: Mapping[str, Any]) -> Driver:
     """Return a driver from what makes one, or from a player of any kind."""
     makes = isinstance(player, type) and issubclass(player, Driver)
     if makes or (inspect.isfunction(player) and player.__name__ == "make"):
-        known = list(inspect.signature(player).parameters)
-        player = _build(f"option of {name}", player, options, known)
+        parameters = inspect.signature(player).parameters
+        for option, value in options.items():
+            numeric = option in parameters and parameters[option].annotation == "float"
+            if numeric and not isinstance(value, (int, float)):
+                raise ValueError(
+                    f"option {option!r} of {name}: expected a number, got {value!r}"
+                )
+        player = _build(f"option of {name}", player, options, list(parameters))
     elif options:
         raise ValueError(f"options {sorted(options)}: {name} takes none")
     return driver_of(player)

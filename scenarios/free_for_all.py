@@ -170,6 +170,7 @@ class FreeForAll(Scenario):
         return "lives " + " : ".join(f"{lives:.0f}" for lives in memory["lives"])
 
     def success(self, t: Transition) -> Array:
+        """(..., seats) bool: the game has ended and the seat has lives left."""
         alive = t.new_memory["lives"] > 0.0
         return np.asarray(alive & self.terminated(t)[..., None])
 

@@ -93,6 +93,7 @@ class HitGoal(GoalScenario):
         return t.new_memory["entered"] | t.after.crossed[..., 0, 0]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: a touched, rising puck has been inside the circle."""
         return t.new_memory["entered"]
 
     @property

@@ -117,6 +117,7 @@ class HitGoalVelocity(GoalScenario):
         return t.new_memory["entered"] | t.after.crossed[..., 0, 0]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: a rising puck has matched the goal in place and velocity."""
         return t.new_memory["entered"]
 
     @property

@@ -83,6 +83,7 @@ class Juggle(Scenario):
         return np.asarray(t.after.crossed[..., 0].any(-1))
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the puck has been hit up ``hits`` times."""
         return np.asarray(t.new_memory["hits"] >= self.hits)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:

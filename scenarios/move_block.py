@@ -118,6 +118,7 @@ class MoveBlock(Scenario):
         return self.success(t) | t.after.crossed[..., 0, 0]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the block has moved by ``way`` since the first touch."""
         return np.asarray(t.new_memory["moved"] >= self.way)
 
 

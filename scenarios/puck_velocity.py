@@ -79,6 +79,7 @@ class PuckVelocity(Scenario):
         return self.success(t) | t.after.crossed[..., 0, 0]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the puck has risen at ``fast`` after a touch."""
         return np.asarray(t.new_memory["rise"] >= self.fast)
 
 

@@ -104,6 +104,7 @@ class Rally(Scenario):
         return f"crossings {memory['crossings']:.0f}"
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the puck has crossed the middle ``crossings`` times."""
         return np.asarray(t.new_memory["crossings"] >= self.crossings)
 
 

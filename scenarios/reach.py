@@ -90,6 +90,7 @@ class Reach(GoalScenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the paddle has been within the radius for two steps on end."""
         return np.asarray(t.new_memory["held"] >= 2)
 
     @property

@@ -102,6 +102,7 @@ class ReachVelocity(GoalScenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the paddle has matched the goal in place and velocity."""
         return t.new_memory["passed"]
 
     @property

@@ -92,6 +92,7 @@ class Strike(Scenario):
         return t.new_memory["struck"]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the puck was fast and far from the paddle in one step."""
         return t.new_memory["struck"]
 
 

@@ -120,6 +120,7 @@ class StrikeCrowd(Scenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the blocks have moved by ``spread`` in all."""
         return np.asarray(t.new_memory["spread"] >= self.spread)
 
 

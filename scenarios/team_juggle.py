@@ -108,6 +108,7 @@ class TeamJuggle(Scenario):
         return f"passes {memory['passes']:.0f}"
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the puck has been passed up ``passes`` times in alternation."""
         return np.asarray(t.new_memory["passes"] >= self.passes)
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:

@@ -69,6 +69,7 @@ class Touch(Scenario):
         return t.after.crossed[..., 0, 0]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: any distinct touch."""
         return rewards.touched(t.new_memory)
 
 

@@ -22,7 +22,7 @@ from marl_airhockey.cli.options import (
 from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.league import find_policies, play_league
 from marl_airhockey.evaluation.standings import Standings
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 SCRIPTS = (
     "random",
@@ -48,7 +48,7 @@ def league(
     out: Annotated[Path, typer.Option(help="Folder of table and picture.")] = Path(
         "runs/league"
     ),
-    backend: Backend = "numba",
+    backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     option: Options = None,
     exploit: Annotated[

@@ -40,8 +40,13 @@ def list_scenarios(
         console.print_json(json.dumps(data))
         return
     console.print(f"[bold]{scenario}[/bold]  {data['id'] or ''}\n{data['what']}\n")
+    console.print(f"[italic]success[/italic]: {data['success']}\n")
     for title in ("seats", "observation", "reward", "options"):
         table = Table(*data[title][0], title=title, title_justify="left")
+        above = ""
         for row in data[title]:
-            table.add_row(*(str(v) for v in row.values()))
+            # What several rows share is said once.
+            shown = {**row, "meaning": ""} if row.get("meaning") == above else row
+            above = row.get("meaning", "")
+            table.add_row(*(str(v) for v in shown.values()))
         console.print(table)

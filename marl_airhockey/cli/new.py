@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import keyword
 from enum import StrEnum
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -30,6 +32,8 @@ def new(
     """Write a scenario or a driver to change: a commented example that runs."""
     if not name.isidentifier() or name != name.lower():
         raise ValueError(f"{name!r}: expected a name like my_task")
+    if keyword.iskeyword(name) or find_spec(name) is not None:
+        raise ValueError(f"{name}: Python has such a word or module; take another")
     own = scenario_names() if kind is Kind.SCENARIO else agent_names()
     if name in {*own, *plugin_names(f"{kind}s")}:
         raise ValueError(f"{name}: there is a {kind} of this name; take another")

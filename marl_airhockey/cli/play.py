@@ -23,6 +23,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, Handicap
+from marl_airhockey.registry import DEFAULT_BACKEND
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def play(
         list[str] | None,
         typer.Option(help="Who sits at one seat, AGENT=NAME; person for people."),
     ] = None,
-    backend: Backend = "pymunk",
+    backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     option: Options = None,
     reaction: Reaction = 1000.0 * Handicap.reaction,

@@ -27,7 +27,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.physics import load_physics
-from marl_airhockey.registry import find_scenario
+from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.config import TrainConfig
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def train(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
     seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
-    backend: Backend = "numba",
+    backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
     hidden: Annotated[
@@ -94,6 +94,10 @@ def train(
         **given,
     }
     config = preset(scenario, changes)
+    updates = -(-config.total_steps // config.rollout)
+    if steps is not None and steps != updates * config.rollout and not as_json:
+        whole, one = updates * config.rollout, config.rollout
+        console.print(f"steps: {whole:,}, as {updates} whole updates of {one:,}")
     folder = out or Path("runs") / f"{find_scenario(scenario).name}-{seed}"
     _train(config, folder, scenario, as_json)
 

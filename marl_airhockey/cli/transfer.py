@@ -25,6 +25,7 @@ from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.physics import PARAMETERS, PROFILES, load_physics
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend, find_scenario, make_agent
+from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
@@ -161,8 +162,21 @@ def _list(names: str) -> list[str]:
 
 
 def _run(folder: Path, config: TrainConfig) -> str:
-    """Train a run, or resume it if it is there; return its folder."""
+    """Train a run, or resume it if it is there; return its folder.
+
+    Raises:
+        ValueError: a run with other settings, or a cut off one that is not trusted.
+    """
+    from marl_airhockey.learn.config import load_config
+    from marl_airhockey.learn.run import TrainingRun
+
     begun = (folder / "config.toml").exists()
+    if begun:
+        run = TrainingRun(load_config(folder / "config.toml"), folder)
+        if run.config != config:
+            raise ValueError(f"{folder} holds another run: say another --out")
+        if run.steps_left > 0:
+            require_trust(folder / "last.zip")
     train_with_progress(None if begun else config, folder)
     return str(folder)
 

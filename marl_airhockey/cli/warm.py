@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from marl_airhockey.cli.options import Backend, Profile, app, bar
-from marl_airhockey.make import make_world
-from marl_airhockey.registry import find_scenario, scenario_names
+from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, scenario_names
+from marl_airhockey.world.build import compile_world
 
 
 @app.command("warm")
@@ -17,7 +16,7 @@ def warm(
     scenarios: Annotated[
         list[str] | None, typer.Argument(help="Scenarios; all if none are given.")
     ] = None,
-    backend: Backend = "numba",
+    backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
 ) -> None:
     """Compile scenarios now, once per machine, so that nothing waits for it later."""
@@ -26,11 +25,5 @@ def warm(
         task = progress.add_task("compiling", total=len(games), note="")
         for name, game in games:
             progress.update(task, note=name)
-            world = make_world(game, 2, backend=backend, profile=profile)
-            world.reset(0)
-            # An episode begins again: what that needs is compiled, too.
-            world.max_cycles = 1
-            for _ in range(2):
-                world.step(np.zeros((2, len(world.open), 2)))
-            world.close()
+            compile_world(game, {"backend": backend, "profile": profile})
             progress.advance(task)

@@ -229,9 +229,9 @@ def _checked(name: str, value: Value) -> tuple[float, float]:
 def _preset(name: object) -> dict[str, float]:
     if name is None:
         return {}
-    if name not in PRESETS:
-        raise ValueError(unknown_name("physics preset", str(name), PRESETS))
-    return PRESETS[str(name)]
+    if not isinstance(name, str) or name not in PRESETS:
+        raise ValueError(unknown_name("physics preset", name, PRESETS))
+    return PRESETS[name]
 
 
 def load_physics(source: str | Path) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.envs.meanings import option_meanings, term_meanings
+from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
 from marl_airhockey.registry import (
     agent_names,
     backend_names,
@@ -67,7 +67,7 @@ def summary() -> dict[str, Any]:
 
 
 def describe(name: str) -> dict[str, Any]:
-    """Return seats, observation, reward terms and options of a scenario."""
+    """Return success, seats, observation, reward terms and options of a scenario."""
     scenario = find_scenario(name)
     layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
     doc = (type(scenario).__doc__ or "").strip()
@@ -76,6 +76,7 @@ def describe(name: str) -> dict[str, Any]:
         "name": name,
         "id": _id(name),
         "what": what(scenario) + "\n" + " ".join(doc.split()),
+        "success": success_meaning(type(scenario)),
         "seats": [
             {
                 "agent": f"paddle_{i}",
@@ -87,9 +88,14 @@ def describe(name: str) -> dict[str, Any]:
             for i, seat in enumerate(scenario.scene.seats)
         ],
         "observation": [
-            {"label": label, "low": round(float(low), 3), "high": round(float(high), 3)}
-            for label, low, high in zip(
-                layout.labels, layout.low, layout.high, strict=True
+            {
+                "label": label,
+                "low": round(float(low), 3),
+                "high": round(float(high), 3),
+                "meaning": " ".join(meaning.split()),
+            }
+            for label, low, high, meaning in zip(
+                *(layout.labels, layout.low, layout.high, layout.meanings), strict=True
             )
         ],
         "reward": [

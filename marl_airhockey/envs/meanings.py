@@ -1,4 +1,4 @@
-"""Meanings of options and reward terms, read off the docstrings of a scenario."""
+"""Meanings of options, success and terms, read off the docstrings of a scenario."""
 
 from __future__ import annotations
 
@@ -40,6 +40,12 @@ def term_meanings(kind: type[Scenario]) -> dict[str, str]:
                 text = inspect.getdoc(vars(base)[function]) or ""
                 found |= {k: _one_line(v) for k, v in TERM.findall(text)}
     return found
+
+
+def success_meaning(kind: type[Scenario]) -> str:
+    """Return the docstring of `success`, without what it says of the shape."""
+    text = _one_line(inspect.getdoc(kind.success) or "")
+    return text.partition(" bool: ")[2] or text
 
 
 def _bodies(kind: type) -> Iterator[list[ast.stmt]]:

@@ -11,15 +11,10 @@ from pettingzoo import ParallelEnv
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.global_state import GlobalState
 from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
-from marl_airhockey.envs.spaces import (
-    action_space,
-    global_state,
-    observation_space,
-    state_labels,
-    state_space,
-)
+from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.step_result import StepResult
@@ -88,7 +83,8 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self._action_spaces = {agent: action_space() for agent in self.possible_agents}
         self.observation_spaces = self._observation_spaces
         self.action_spaces = self._action_spaces
-        self.state_space = state_space(self.world)
+        self._global_state = GlobalState(self.world)
+        self.state_space = self._global_state.space
         self.np_random = np.random.default_rng()
 
     @property
@@ -133,7 +129,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     @property
     def state_labels(self) -> tuple[str, ...]:
         """Name of each element of `state`."""
-        return state_labels(self.world)
+        return self._global_state.labels
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -247,8 +243,14 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         }
 
     def state(self) -> Array:
-        """Return the true state of everything, table frame, as flat numbers."""
-        return np.asarray(global_state(self.world)[0])
+        """Return the true state of everything, see `global_state.GlobalState`.
+
+        Raises:
+            RuntimeError: before the first `reset`.
+        """
+        if not self.world.episode.number[0]:
+            raise RuntimeError("state: call reset() first; no episode is running")
+        return np.asarray(self._global_state.read()[0])
 
     def render(self) -> Array | None:
         """Return a picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""

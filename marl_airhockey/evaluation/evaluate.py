@@ -109,6 +109,8 @@ def evaluate(
         ValueError: a seat without a driver, named.
     """
     keywords = keywords if keywords is not None else {}
+    if episodes < 1:
+        raise ValueError(f"episodes: {episodes} must be at least 1")
     world = build_driven_world(driver, scenario, episodes, keywords)
     world.reset(seed)
     statistics = _EpisodeStatistics(world)

@@ -44,8 +44,10 @@ def play_league(
     names, count = tuple(players), len(players)
     if count < 2:
         raise ValueError("a league needs at least two players, of different names")
-    if games < 1:
-        raise ValueError(f"games: {games} must be at least 1")
+    if games < 2 or games % 2:
+        raise ValueError(
+            f"games: {games} must be an even number above 0, as ends change at half"
+        )
     pairs = np.array(list(combinations(range(count), 2)))
     lineups = pairs.repeat(games, axis=0)
     swapped = np.arange(len(lineups)) % games >= games // 2
@@ -68,7 +70,10 @@ def play_league(
     draws[a, b] = draws[b, a] = (~won.any(-1)).sum(1)
     goals[a, b], goals[b, a] = margin.reshape(len(pairs), games, 2).mean(1).T
     ratings = elo(wins + 0.5 * draws, wins + wins.T + draws)
-    spread = _rating_intervals(won, pairs, count, seed)
+    spread = _rating_intervals(wins, draws, pairs, seed)
+    # One-sided results lie at the edge of what is likely behind them.
+    spread[:, 0] = np.minimum(spread[:, 0], ratings)
+    spread[:, 1] = np.maximum(spread[:, 1], ratings)
     return Standings(scenario, names, games, wins, draws, goals, ratings, spread)
 
 
@@ -96,17 +101,20 @@ def _arrays(results: GameResults) -> tuple[Array, Array, Array]:
     return results.won, results.margin, results.seconds
 
 
-def _rating_intervals(won: Array, pairs: Array, count: int, seed: int) -> Array:
-    """Return (E, 2) 95 % intervals of ratings, by resampling the games of each pair."""
-    rng, games, found = np.random.default_rng(seed), won.shape[1], []
-    points = won + 0.5 * ~won.any(-1, keepdims=True)
-    a, b = pairs.T
-    played = np.zeros((count, count))
-    played[a, b] = played[b, a] = games
+def _rating_intervals(wins: Array, draws: Array, pairs: Array, seed: int) -> Array:
+    """Return (E, 2) 95 % intervals of ratings.
+
+    Ratings are drawn from what the shares of won, drawn and lost games of each pair may
+    be (Dirichlet, Jeffreys' prior), so that 100 wins of 100 leave a doubt, too.
+    """
+    rng, found, (a, b) = np.random.default_rng(seed), [], pairs.T
+    counts = np.stack([wins[a, b], draws[a, b], wins[b, a]], -1)
+    played = wins + wins.T + draws
     for _ in range(200):
-        drawn = rng.integers(0, games, (len(pairs), games))
-        sums = np.take_along_axis(points, drawn[..., None], axis=1).sum(1)
-        score = np.zeros((count, count))
-        score[a, b], score[b, a] = sums.T
+        shares = rng.standard_gamma(counts + 0.5)
+        shares /= shares.sum(-1, keepdims=True)
+        score = np.zeros(wins.shape)
+        score[a, b] = (shares[:, 0] + 0.5 * shares[:, 1]) * played[a, b]
+        score[b, a] = played[a, b] - score[a, b]
         found.append(elo(score, played))
     return np.quantile(found, [0.025, 0.975], axis=0).T

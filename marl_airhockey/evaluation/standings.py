@@ -31,7 +31,7 @@ class Standings:
     ratings: Array
     """(E,) Elo ratings, 1000 on average"""
     rating_intervals: Array
-    """(E, 2) 95 % intervals of the ratings, by resampling games"""
+    """(E, 2) 95 % intervals of the ratings"""
 
     @property
     def score(self) -> Array:

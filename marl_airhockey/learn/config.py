@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.registry import find_scenario, runs_code
+from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, runs_code
 from marl_airhockey.toolkit.policies import RUN_FORMAT, check_run_format
 from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.world.build import Keywords
@@ -46,7 +46,7 @@ class TrainConfig:
 
     scenario: str
     seed: int = 0
-    backend: str = "numba"
+    backend: str = DEFAULT_BACKEND
     profile: str = "ideal"
     observe: str = "velocity"
     options: dict[str, Any] = field(default_factory=dict)
@@ -126,11 +126,10 @@ class TrainConfig:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
         if self.engine == "rllib":
             self._check_rllib()
-        rollout = self.n_steps * self.slots
-        if rollout % self.batch_size:
+        if self.rollout % self.batch_size:
             raise ValueError(
                 f"batch_size: {self.batch_size} must divide n_steps x learners in "
-                f"num_worlds worlds, {rollout}"
+                f"num_worlds worlds, {self.rollout}"
             )
 
     def _check_rllib(self) -> None:
@@ -165,6 +164,11 @@ class TrainConfig:
             return self.num_worlds * seats
         mirrored = round(self.mirror * self.num_worlds)
         return mirrored * seats + (self.num_worlds - mirrored) * (seats // teams)
+
+    @property
+    def rollout(self) -> int:
+        """Number of steps between two updates; training ends with a whole one."""
+        return self.n_steps * self.slots
 
     @property
     def keywords(self) -> Keywords:

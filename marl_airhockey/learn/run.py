@@ -64,7 +64,7 @@ class TrainingRun:
             with self._table.open() as file:
                 *_, last = csv.DictReader(file)
             self.latest = {name: float(value) for name, value in last.items()}
-        self._start_clock()
+        self.start_clock()
 
     @property
     def steps_left(self) -> int:
@@ -76,7 +76,8 @@ class TrainingRun:
         """True if it is time for an evaluation."""
         return self.progress.steps >= self._next
 
-    def _start_clock(self) -> None:
+    def start_clock(self) -> None:
+        """Count the time of training from now on."""
         self._clock = (time.process_time(), time.perf_counter())
 
     def update_progress(self, steps: int, rate: float, elsewhere: float = 0.0) -> None:
@@ -88,7 +89,7 @@ class TrainingRun:
             elsewhere: CPU time of other processes since the last call, s.
         """
         progress, began = self.progress, self._clock
-        self._start_clock()
+        self.start_clock()
         progress.cpu_seconds += self._clock[0] - began[0] + elsewhere
         progress.wall_seconds += self._clock[1] - began[1]
         progress.steps, progress.rate = steps, rate
@@ -126,7 +127,7 @@ class TrainingRun:
         save("last")
         progress.save(self.folder / "state.json")
         self._next = (progress.steps // self._every + 1) * self._every
-        self._start_clock()
+        self.start_clock()
         return self.latest
 
     @property

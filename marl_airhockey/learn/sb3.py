@@ -20,6 +20,7 @@ from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.sb3_callback import AdaptiveRate, TrainingCallback
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.toolkit.policies import load_weights
+from marl_airhockey.world.build import compile_world
 
 
 def train_with_sb3(run: TrainingRun) -> Metrics:
@@ -48,6 +49,8 @@ def _train(run: TrainingRun) -> Metrics:
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(_logger(folder, progress.steps))
     callback = TrainingCallback(run, rate)
+    compile_world(config.scenario, config.keywords)
+    run.start_clock()
     fresh = progress.steps == 0
     model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
     row = callback.evaluate()

@@ -18,6 +18,7 @@ from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.grade import Metrics
 from marl_airhockey.learn.run import ProgressCallback, TrainingRun
+from marl_airhockey.registry import make_agent
 
 
 def train(
@@ -45,6 +46,9 @@ def train(
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()
+    if config.self_play:  # Refused now, not at the first evaluation.
+        for name in {*config.opponents, *config.rivals}:
+            make_agent(name)
     if (folder / "config.toml").exists():
         return _go_on(engine, TrainingRun(config, folder, report))
     before = set(folder.rglob("*"))

@@ -19,6 +19,7 @@ from typing import Any, TextIO
 from marl_airhockey.evaluation.recordings import FORMAT
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.messages import rounded
+from marl_airhockey.registry import DEFAULT_BACKEND
 
 SYNC = 1.0
 """Time between two calls of fsync, s."""
@@ -67,7 +68,7 @@ class Recorder:
                 "format": FORMAT,
                 "began": now.isoformat(),
                 "options": match.keywords.get("options", {}),
-                "backend": match.keywords.get("backend", "pymunk"),
+                "backend": match.keywords.get("backend", DEFAULT_BACKEND),
                 "profile": match.keywords.get("profile", "ideal"),
                 "control_dt": match.world.control_dt,
                 "physics": {k: float(v[0]) for k, v in physics.items()},

@@ -9,7 +9,7 @@ from typing import Any
 
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON
-from marl_airhockey.registry import runs_code
+from marl_airhockey.registry import DEFAULT_BACKEND, runs_code
 from marl_airhockey.study.orders import ORDERS
 
 EXAMPLE = Path(__file__).parent / "example.toml"
@@ -140,7 +140,7 @@ class Plan:
     blind: bool = True
     """True if participants see "Opponent 1" instead of a name."""
     questions: tuple[Question, ...] = tuple(QUESTIONS.values())
-    backend: str = "pymunk"
+    backend: str = DEFAULT_BACKEND
     profile: str = "ideal"
     options: dict[str, Any] = field(default_factory=dict)
     """Options of the scenario."""

@@ -138,6 +138,7 @@ class Versus(Scenario):
         return "goals " + " : ".join(f"{goals:.0f}" for goals in memory["goals"])
 
     def success(self, t: Transition) -> Array:
+        """(..., seats) bool: the team has ``goals_to_win``, or leads as time ends."""
         goals = t.new_memory["goals"]
         ahead = t.last[..., None] & (goals > goals[..., ::-1])
         won = (goals >= self.goals_to_win) | ahead

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TypedDict
 
+import numpy as np
+
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import (
@@ -99,7 +101,10 @@ def build_world(
     usual = "history" if profile == "robot" else "velocity"
     agents = [f"paddle_{i}" for i in range(len(scene.seats))]
     drivers: dict[int, Driver] = {}
-    for agent, driver in keywords.get("drivers", {}).items():
+    given_drivers = keywords.get("drivers", {})
+    if not isinstance(given_drivers, Mapping):
+        raise ValueError(f"drivers: {given_drivers!r} is no dict of players by agent")
+    for agent, driver in given_drivers.items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
         drivers[agents.index(agent)] = make_agent(driver)
@@ -112,6 +117,16 @@ def build_world(
         max_cycles,
         autoreset,
     )
+
+
+def compile_world(scenario: str | Scenario, keywords: Keywords) -> None:
+    """Compile all that a world needs, once per machine, restarts too."""
+    world = build_world(scenario, 2, autoreset=True, keywords=keywords)
+    world.reset(0)
+    world.max_cycles = 1
+    for _ in range(2):
+        world.step(np.zeros((2, len(world.open), 2)))
+    world.close()
 
 
 def _check_times(

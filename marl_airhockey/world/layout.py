@@ -31,6 +31,12 @@ class ObservationLayout:
             for observable, a, b in zip(observables, starts, ends, strict=True)
         ]
         flat = [column for part in columns for column in part]
+        self.meanings = tuple(
+            (type(observable).__doc__ or "").partition("\n\n")[0]
+            for observable, part in zip(observables, columns, strict=True)
+            for _ in part
+        )
+        """What each column is of: the first sentence of its observable's docstring"""
         self.labels = tuple(column.label for column in flat)
         self.low = np.array([c.low for c in flat], np.float32)
         self.high = np.array([c.high for c in flat], np.float32)

@@ -108,6 +108,7 @@ class Referee:
         t = t._replace(new_memory=game.next_memory(t))
         terms, terminated = game.all_reward_terms(t), game.is_terminated(t)
         success = game.is_success(t)
+        _check_shapes(terms, terminated, success, episode["returns"].shape)
         if success.ndim == after.time.ndim:
             success = success[..., None]
         reward = reduce(np.add, terms.values(), 0.0 * episode["returns"])
@@ -135,3 +136,27 @@ class Referee:
         if serves is not None:
             outcome["serves"] = serves & ~terminated & ~over
         return t.new_memory, terms, counters, outcome, self._show(after, t.new_memory)
+
+
+def _check_shapes(
+    terms: Memory, terminated: Array, success: Array, shape: tuple[int, ...]
+) -> None:
+    """Refuse results of a scenario that have not a number for each seat, (..., S)."""
+    lead = shape[:-1]
+    per_seat = "a number for each seat, {}; end one of the whole world with [..., None]"
+    for name, term in terms.items():
+        if np.shape(term) not in (shape, (*lead, 1)):
+            raise ValueError(
+                f"reward term {name!r} has shape {np.shape(term)}, expected "
+                + per_seat.format(shape)
+            )
+    if np.shape(terminated) != lead:
+        raise ValueError(
+            f"terminated has shape {np.shape(terminated)}, expected {lead}: a truth "
+            "value for each world"
+        )
+    if np.shape(success) not in (lead, shape, (*lead, 1)):
+        raise ValueError(
+            f"success has shape {np.shape(success)}, expected {lead}, or {shape} for "
+            "each seat"
+        )

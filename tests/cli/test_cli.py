@@ -32,7 +32,8 @@ def test_list_describes_one(scenario):
     assert labels == list(env.observation_labels("paddle_0"))
     assert data["reward"]
     assert data["what"]
-    for row in (*data["reward"], *data["options"]):
+    assert data["success"]
+    for row in (*data["reward"], *data["options"], *data["observation"]):
         assert row["meaning"], f"{row} says nothing"
 
 
@@ -133,6 +134,8 @@ def test_a_new_scenario_and_a_new_driver_run(tmp_path):
     [
         (("scenario", "juggle"), "there is a scenario of this name"),
         (("driver", "striker"), "there is a driver of this name"),
+        (("driver", "numpy"), "such a word or module"),
+        (("scenario", "class"), "such a word or module"),
         (("driver", "My-Push"), "expected a name like my_task"),
         (("driver", "my_push", "--out", "nowhere"), "no such folder"),
     ],

@@ -34,6 +34,20 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
             "'paddle_7'",
         ),
         (lambda: ah.parallel_env("juggle", options={"lifft": 1}), "there are: lift"),
+        (
+            lambda: ah.parallel_env("duel", drivers={"paddle_0": "striker:back=abc"}),
+            "option 'back' of striker: expected a number, got 'abc'",
+        ),
+        (
+            lambda: ah.parallel_env("duel", drivers=["striker"]),
+            "is no dict of players by agent",
+        ),
+        (
+            lambda: ah.parallel_env("juggle", physics={"preset": ["wooden"]}),
+            "unknown physics preset",
+        ),
+        (lambda: ah.evaluate("still", "juggle", episodes=0), "episodes: 0 must be"),
+        (lambda: ah.league("duel", ["still", "random"], games=3), "an even number"),
         (lambda: ah.parallel_env("juggle", observ="velocity"), "there are: observe"),
         (lambda: ah.parallel_env("juggle", observe="speed"), "unknown observe 'speed'"),
         (lambda: ah.parallel_env("juggle", profile="real"), "unknown profile 'real'"),
@@ -218,3 +232,20 @@ def test_seeds_are_one_number_or_one_for_each_world():
             ValueError, match="is no whole number, nor one for each of 3"
         ):
             world.reset(wrong)
+
+
+@pytest.mark.parametrize(
+    ("function", "result", "words"),
+    [
+        ("reward_terms", {"goal": np.zeros(1)}, r"'goal' has shape \(1,\)"),
+        ("reward_terms", {"goal": 1.0}, r"'goal' has shape \(\), expected a number"),
+        ("reward_terms", {"goal": np.zeros((1, 7))}, r"\(1, 7\), expected"),
+        ("terminated", np.zeros((1, 2), bool), r"terminated has shape \(1, 2\)"),
+        ("success", np.zeros((1, 5), bool), r"success has shape \(1, 5\)"),
+    ],
+)
+def test_a_wrong_shape_of_a_scenario_is_named(function, result, words):
+    kind = type("Wrong", (Pair,), {function: lambda self, t: result})
+    env = ah.parallel_env(kind())
+    with pytest.raises(ValueError, match=words):
+        env.reset(seed=0)

@@ -1,6 +1,7 @@
 """Open and driven seats as PettingZoo sees them."""
 
 import gymnasium
+import numpy as np
 import pytest
 from pair import Pair
 from pettingzoo.test import max_cycles_test, parallel_api_test
@@ -32,6 +33,7 @@ def test_every_number_of_state_and_observation_has_a_name():
     state, _ = env.get_state()
     assert named["puck_0.vx"] == pytest.approx(state.puck_velocity[0, 0])
     assert named["paddle_1.y"] == pytest.approx(state.paddle[1, 1])
+    assert named["puck_0.spin"] == pytest.approx(state.puck_edge[0])
     labels = env.observation_labels("paddle_0")
     assert ah.make_sb3_vec("duel", 2).observation_labels == labels
     single, many = ah.parallel_env("reach"), ah.make_vec("reach", 2)
@@ -39,6 +41,22 @@ def test_every_number_of_state_and_observation_has_a_name():
     own = single.observation_labels("paddle_0")
     assert many.observation_labels == task.observation_labels == own
     assert len(own) == task.observation_space.shape[0]
+
+
+@pytest.mark.parametrize("name", ["free_for_all", "hit_goal", "move_block", "rally"])
+def test_the_state_holds_what_the_scenario_remembers(name):
+    env = ah.parallel_env(name)
+    env.reset(seed=0)
+    shown = []
+    for _ in range(40):
+        env.step({a: env.action_space(a).sample() for a in env.agents})
+        shown.append(env.state())
+        assert env.state_space.contains(shown[-1])
+    named = dict(zip(env.state_labels, shown[-1], strict=True))
+    for key, array in env.get_state()[1].items():
+        places = ["_".join(map(str, (key, *i))) for i in np.ndindex(array.shape)]
+        kept = np.clip(array.astype(np.float32).ravel(), -10, 10)
+        assert [named[place] for place in places] == kept.tolist()
 
 
 def test_games_are_imported_as_those_of_pettingzoo():

@@ -21,6 +21,7 @@ def test_a_league_rates_and_names_its_files(tmp_path):
     assert standings.names[standings.order[0]] == "allround"
     low, high = standings.rating_intervals.T
     assert ((low <= standings.ratings) & (standings.ratings <= high)).all()
+    assert (high - low > 1.0).all()
     files = standings.save(tmp_path)
     assert [f.name for f in files] == ["league.json", "league.md", "league.png"]
     report = json.loads(files[0].read_text())

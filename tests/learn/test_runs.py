@@ -123,6 +123,9 @@ def test_a_run_that_fails_to_start_leaves_no_folder(tmp_path):
     with pytest.raises(ValueError, match="unknown driver"):
         ah.train("duel", folder, drivers={"paddle_1": "nobody"}, total_steps=1000)
     assert not folder.exists()
+    with pytest.raises(ValueError, match="unknown driver"):
+        ah.train("duel", folder, rivals=["nobody"], total_steps=1000)
+    assert not folder.exists()
     folder.mkdir(parents=True)
     (folder / "notes.txt").write_text("mine")
     with pytest.raises(ValueError, match="unknown driver"):

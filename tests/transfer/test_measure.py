@@ -8,6 +8,7 @@ from marl_airhockey.cli.main import app
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_agent
+from marl_airhockey.toolkit.trust import Trust
 from marl_airhockey.transfer.measure import (
     fine_tuning_config,
     measure_transfer,
@@ -76,11 +77,18 @@ def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
     def train(config, folder):
         trained.append((folder.name, config is None))
         folder.mkdir(exist_ok=True)
-        (folder / "config.toml").touch()
+        if config is not None:
+            (folder / "config.toml").write_text(config.to_toml())
         raise RuntimeError("cut off")
 
     monkeypatch.setattr("marl_airhockey.cli.transfer.train_with_progress", train)
-    for _ in range(2):
-        with pytest.raises(RuntimeError, match="cut off"):
-            app(ask, standalone_mode=False)
+    monkeypatch.setattr(Trust, "answer", None)
+    with pytest.raises(RuntimeError, match="cut off"):
+        app(ask, standalone_mode=False)
+    with pytest.raises(ValueError, match="--trust"):
+        app(ask, standalone_mode=False)
+    with pytest.raises(ValueError, match="holds another run"):
+        app([*ask, "--seed", "1"], standalone_mode=False)
+    with pytest.raises(RuntimeError, match="cut off"):
+        app([*ask, "--trust"], standalone_mode=False)
     assert trained == [("ideal", False), ("ideal", True)]

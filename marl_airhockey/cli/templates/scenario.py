@@ -110,6 +110,7 @@ class Template(Scenario):
         return t.new_memory["done"]
 
     def success(self, t: Transition) -> Array:
+        """(...) bool: the bank shot was struck."""
         # It must be out of reach of luck: `airhockey evaluate still` and `random` tell.
         return t.new_memory["done"]
 
