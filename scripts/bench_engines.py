@@ -25,10 +25,10 @@ from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
 from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.engine import AdaptiveRate
 from marl_airhockey.learn.rllib import build_algorithm, start_ray
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU
 from marl_airhockey.learn.sb3 import build_model
-from marl_airhockey.learn.sb3_callback import AdaptiveRate
 from marl_airhockey.learn.self_play import make_training_env
 
 

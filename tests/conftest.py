@@ -96,3 +96,16 @@ def browser():
         )
         yield found
         found.close()
+
+
+@pytest.fixture(scope="session")
+def sb3_run(tmp_path_factory):
+    """The folder of a short run of the engine sb3."""
+    from runs import SMALL
+
+    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.train import train
+
+    folder = tmp_path_factory.mktemp("sb3") / "touch-0"
+    train(preset("touch", {**SMALL, "engine": "sb3"}), folder)
+    return folder

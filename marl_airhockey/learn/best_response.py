@@ -40,7 +40,7 @@ def best_response(
     seats = find_scenario(scenario).scene.seats
     opponents = [i for i, seat in enumerate(seats) if seat.team != seats[0].team]
     drivers = {f"paddle_{i}": player for i in opponents}
-    if (folder / "last.zip").exists():
+    if (folder / "state.json").exists():
         load_config(folder / "config.toml")
     else:
         changes = {"drivers": drivers, "total_steps": steps, "seed": seed}

@@ -55,13 +55,13 @@ class TrainConfig:
     """Drivers of seats that are not learned, by agent"""
     physics: dict[str, Any] = field(default_factory=dict)
     """Physical parameters, by name: numbers or ranges"""
-    engine: str = "sb3"
-    """"sb3" in this process, or "rllib" over many."""
+    engine: str = "torch"
+    """"torch" or "sb3" in this process, or "rllib" over many."""
     num_env_runners: int = 0
     """Number of processes in which rllib steps worlds; 0 for the learner's"""
 
     init: str = ""
-    """Folder of an sb3 run of the same network size, to begin with its weights"""
+    """Folder of a run of the same engine and network size, to begin with its weights"""
 
     total_steps: int
     """Steps of single worlds, summed over all worlds"""
@@ -124,6 +124,11 @@ class TrainConfig:
         for name in ("mirror", "script_share"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
+        if self.engine != "sb3" and self.needs_sb3(self.observe, self.options):
+            raise ValueError(
+                f"engine: {self.engine} learns from flat observations; take sb3 for "
+                'observe="pixels" and goals="dict"'
+            )
         if self.engine == "rllib":
             self._check_rllib()
         if self.rollout % self.batch_size:
@@ -132,14 +137,14 @@ class TrainConfig:
                 f"num_worlds worlds, {self.rollout}"
             )
 
+    @staticmethod
+    def needs_sb3(observe: str, options: Mapping[str, Any]) -> bool:
+        """Return True if only the engine sb3 learns from observations of a form."""
+        return observe == "pixels" or options.get("goals") == "dict"
+
     def _check_rllib(self) -> None:
-        if self.observe == "pixels" or self.options.get("goals"):
-            raise ValueError(
-                "engine: rllib learns from flat observations here; take sb3 for "
-                'observe="pixels" and goals="dict"'
-            )
         if self.init:
-            raise ValueError("init: sb3 can begin with the weights of a run, rllib not")
+            raise ValueError("init: rllib cannot begin with the weights of a run")
         runners = self.num_env_runners
         if runners < 0 or self.num_worlds % max(runners, 1):
             raise ValueError(
@@ -230,9 +235,12 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
         if name not in known:
             raise ValueError(unknown_name("setting", name, known))
     merged = {**presets["defaults"], **presets.get(game.name, {})}
-    robot = {"observe": "history", **merged.pop("robot", {})}
-    merged |= robot if (changes or {}).get("profile") == "robot" else {}
+    sensed = {"observe": "history", **merged.pop("sensed", {})}
+    merged |= sensed if (changes or {}).get("profile", "ideal") != "ideal" else {}
     merged |= changes or {}
+    form = merged.get("observe", "velocity"), merged.get("options", {})
+    if TrainConfig.needs_sb3(*form):
+        merged = {"engine": "sb3", **merged}
     return TrainConfig(**{**merged, "scenario": scenario})
 
 

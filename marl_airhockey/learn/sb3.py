@@ -6,18 +6,14 @@ from pathlib import Path
 
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.logger import (
-    CSVOutputFormat,
-    Logger,
-    TensorBoardOutputFormat,
-)
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig, load_config
+from marl_airhockey.learn.engine import AdaptiveRate, make_logger, training_threads
 from marl_airhockey.learn.grade import Metrics
 from marl_airhockey.learn.network import FixedScale, policy_card
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.learn.sb3_callback import AdaptiveRate, TrainingCallback
+from marl_airhockey.learn.sb3_callback import TrainingCallback
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.toolkit.policies import load_weights
 from marl_airhockey.world.build import compile_world
@@ -25,13 +21,8 @@ from marl_airhockey.world.build import compile_world
 
 def train_with_sb3(run: TrainingRun) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
-    torch.set_num_threads(run.config.torch_threads)
-    # Of the whole process, so it must not stay: others count on subnormal numbers.
-    torch.set_flush_denormal(True)
-    try:
+    with training_threads(run.config.torch_threads):
         return _train(run)
-    finally:
-        torch.set_flush_denormal(False)
 
 
 def _train(run: TrainingRun) -> Metrics:
@@ -47,7 +38,7 @@ def _train(run: TrainingRun) -> Metrics:
             _take_weights(model, Path(config.init))
     # A resumed run must not repeat the episodes of its beginning.
     env.seed(config.seed * 10_000 + progress.steps % 9973)
-    model.set_logger(_logger(folder, progress.steps))
+    model.set_logger(make_logger(folder, progress.steps))
     callback = TrainingCallback(run, rate)
     compile_world(config.scenario, config.keywords)
     run.start_clock()
@@ -60,13 +51,6 @@ def _train(run: TrainingRun) -> Metrics:
     return row
 
 
-def _logger(folder: Path, steps: int) -> Logger:
-    """Return a logger to CSV and tensorboard; a resumed run begins another CSV."""
-    name = f"progress-{steps}.csv" if steps else "progress.csv"
-    table = CSVOutputFormat(str(folder / name))
-    return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
-
-
 def _take_weights(model: PPO, run: Path) -> None:
     """Load the weights of a run into a model, its exploration among them.
 
@@ -76,7 +60,7 @@ def _take_weights(model: PPO, run: Path) -> None:
     kept = [run / f"{name}.zip" for name in ("best", "last")]
     path = next((file for file in kept if file.exists()), None)
     if path is None:
-        raise ValueError(f"init: {run} is no folder of a run of sb3")
+        raise ValueError(f"init: {run} is no folder of a run of the engine sb3")
     if (run / "config.toml").exists():
         load_config(run / "config.toml")
     weights = load_weights(path)

@@ -1,4 +1,4 @@
-"""Callback of stable-baselines3: learning rate, logs, evaluations, checkpoints."""
+"""Callback of stable-baselines3: logs, evaluations, checkpoints."""
 
 from __future__ import annotations
 
@@ -9,40 +9,13 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.engine import AdaptiveRate, note_step
 from marl_airhockey.learn.grade import Metrics, grade
 from marl_airhockey.learn.network import to_numpy
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import Policy
-
-
-class AdaptiveRate:
-    """Learning rate that follows the KL divergence of updates and fades to a tenth.
-
-    Above twice the target divergence the rate is divided by 1.5, below half of it
-    multiplied by 1.5 (after Schulman et al., 2017, who adapt their penalty so).
-
-    Args:
-        config: configuration of the run; gives the target and the rate's bounds.
-        rate: first rate.
-    """
-
-    def __init__(self, config: TrainConfig, rate: float) -> None:
-        self.rate, self._config = rate, config
-
-    def __call__(self, remaining: float) -> float:
-        """Return the rate when a share ``remaining`` (1 to 0) of training is left."""
-        return self.rate * (0.1 + 0.9 * remaining)
-
-    def adapt(self, divergence: float) -> None:
-        """Adapt the rate to the divergence of the last update."""
-        config = self._config
-        if divergence > 2 * config.target_kl:
-            self.rate = max(self.rate / 1.5, 0.03 * config.learning_rate)
-        elif divergence < config.target_kl / 2:
-            self.rate = min(self.rate * 1.5, config.highest_rate)
 
 
 class TrainingCallback(BaseCallback):
@@ -72,11 +45,7 @@ class TrainingCallback(BaseCallback):
     def _on_step(self) -> bool:
         env = self.training_env
         assert isinstance(env, AirHockeyVecEnv)
-        for name, value in env.last_terms.items():
-            self.logger.record_mean(f"reward/{name}", value)
-        if isinstance(env, SelfPlayVecEnv):
-            for name, value in env.scores.items():
-                self.logger.record(f"score/{name}", value)
+        note_step(self.logger, env)
         return True
 
     def _on_rollout_start(self) -> None:

@@ -42,7 +42,9 @@ def train(
     if config is None:
         config = load_config(folder / "config.toml")
     elif (folder / "config.toml").exists():
-        raise ValueError(f"{folder} holds a run already: resume it, or say another")
+        raise ValueError(
+            f"{folder} holds a run already: --resume it, or say another --out"
+        )
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()
@@ -89,6 +91,13 @@ def _sb3() -> Engine:
     return train_with_sb3
 
 
+def _torch() -> Engine:
+    require("stable_baselines3", "train")
+    from marl_airhockey.learn.ppo import train_with_torch
+
+    return train_with_torch
+
+
 def _rllib() -> Engine:
     require("ray", "distributed")
     from marl_airhockey.learn.rllib import train_with_rllib
@@ -96,7 +105,11 @@ def _rllib() -> Engine:
     return train_with_rllib
 
 
-ENGINES: dict[str, Callable[[], Engine]] = {"sb3": _sb3, "rllib": _rllib}
+ENGINES: dict[str, Callable[[], Engine]] = {
+    "torch": _torch,
+    "sb3": _sb3,
+    "rllib": _rllib,
+}
 """Loaders of the engines, by name; an engine is imported when it is used"""
 
 

@@ -52,8 +52,10 @@ def test_a_run_leaves_all_that_is_needed(touch_run):
         "versions.json",
         "progress.csv",
         "evaluations.csv",
-        "best.zip",
-        "last.zip",
+        "best.npz",
+        "best.pt",
+        "last.npz",
+        "last.pt",
         "state.json",
     }
     assert any("tfevents" in name for name in names)
@@ -81,10 +83,12 @@ def test_a_finished_run_is_not_overwritten(touch_run):
     assert int(train(None, touch_run)["steps"]) == int(steps)
 
 
-def test_a_killed_run_goes_on_where_it_stood(tmp_path):
+@pytest.mark.parametrize("engine", ["torch", "sb3"])
+def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "marl_airhockey.cli", "train", "touch"]
     command += ["--out", str(folder), "--steps", "200000", "--set", "num_worlds=32"]
+    command += ["--engine", engine]
     for setting in ("batch_size=256", "evaluations=25", "eval_episodes=5"):
         command += ["--set", setting]
     process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
@@ -131,3 +135,21 @@ def test_a_run_that_fails_to_start_leaves_no_folder(tmp_path):
     with pytest.raises(ValueError, match="unknown driver"):
         ah.train("duel", folder, drivers={"paddle_1": "nobody"}, total_steps=1000)
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+
+
+def test_weights_of_a_torch_run_hold_no_code(touch_run, tmp_path):
+    state = torch.load(touch_run / "last.pt", weights_only=True)
+    assert set(state) == {"model", "optimizer"}
+    fresh = preset("touch", {**SMALL, "init": str(touch_run)})
+    row = train(fresh, tmp_path / "again")
+    assert row["success"] > 0.5
+
+
+@pytest.mark.parametrize("changes", [{"observe": "pixels"}, {"goals": "dict"}])
+def test_pixels_and_goals_are_learned_by_sb3(changes):
+    options = {"goals": changes["goals"]} if "goals" in changes else {}
+    given = {k: v for k, v in changes.items() if k == "observe"}
+    assert preset("reach", {**given, "options": options}).engine == "sb3"
+    assert preset("reach").engine == "torch"
+    with pytest.raises(ValueError, match="torch learns from flat observations"):
+        preset("reach", {**given, "options": options, "engine": "torch"})

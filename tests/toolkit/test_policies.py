@@ -19,7 +19,7 @@ def test_a_policy_plays_the_same_deterministically_and_samples_otherwise(touch_r
     mean = evaluate(load_policy(touch_run), "mean", "touch", 40)
     again = evaluate(load_policy(touch_run), "mean", "touch", 40)
     assert mean.returns == again.returns
-    sampled = load_policy(touch_run / "best.zip", deterministic=False)
+    sampled = load_policy(touch_run, deterministic=False)
     assert evaluate(sampled, "sampled", "touch", 40).returns != mean.returns
 
 
@@ -37,8 +37,8 @@ def test_any_sb3_zip_whose_spaces_fit_drives(tmp_path):
         assert result.episodes == 5
 
 
-def test_a_policy_of_a_run_of_another_format_is_refused(touch_run, tmp_path):
-    model = PPO.load(touch_run / "last.zip", device="cpu")
+def test_a_policy_of_a_run_of_another_format_is_refused(sb3_run, tmp_path):
+    model = PPO.load(sb3_run / "last.zip", device="cpu")
     assert model.card["run_format"] == RUN_FORMAT
     del model.card["run_format"]
     model.save(tmp_path / "last.zip")

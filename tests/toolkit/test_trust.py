@@ -71,18 +71,18 @@ def test_a_yes_to_all_files_or_at_a_terminal_loads_it(trap, monkeypatch, capsys)
     assert load_policy(path).shape == (8,)
 
 
-def test_a_run_is_played_from_its_weights_alone(touch_run, tmp_path):
-    assert {path.name for path in touch_run.iterdir()} >= {"best.npz", "last.npz"}
+def test_a_run_is_played_from_its_weights_alone(sb3_run, tmp_path):
+    assert {path.name for path in sb3_run.iterdir()} >= {"best.npz", "last.npz"}
     seen = np.random.default_rng(0).normal(size=(5, 12)).astype(np.float32)
-    whole = PPO.load(touch_run / "last.zip", device="cpu")
+    whole = PPO.load(sb3_run / "last.zip", device="cpu")
     mean = np.clip(whole.predict(seen, deterministic=True)[0], -1, 1)
     for name in ("last.npz", "last.zip"):
-        policy = load_policy(touch_run / name)
+        policy = load_policy(sb3_run / name)
         np.testing.assert_allclose(
             np.clip(policy.predict(seen, True), -1, 1), mean, atol=1e-5
         )
     # Pickles in a zip of our training are not looked at.
-    with zipfile.ZipFile(touch_run / "last.zip") as old:
+    with zipfile.ZipFile(sb3_run / "last.zip") as old:
         data = json.loads(old.read("data"))
         data["policy_class"][":serialized:"] = "no pickle"
         with zipfile.ZipFile(tmp_path / "last.zip", "w") as new:

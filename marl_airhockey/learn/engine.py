@@ -1,0 +1,75 @@
+"""Parts that the engines in one process share: rate, logs, threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import torch
+from stable_baselines3.common.logger import (
+    CSVOutputFormat,
+    Logger,
+    TensorBoardOutputFormat,
+)
+
+from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.self_play import SelfPlayVecEnv
+
+
+class AdaptiveRate:
+    """Learning rate that follows the KL divergence of updates and fades to a tenth.
+
+    Above twice the target divergence the rate is divided by 1.5, below half of it
+    multiplied by 1.5 (after Schulman et al., 2017, who adapt their penalty so).
+
+    Args:
+        config: configuration of the run; gives the target and the rate's bounds.
+        rate: first rate.
+    """
+
+    def __init__(self, config: TrainConfig, rate: float) -> None:
+        self.rate, self._config = rate, config
+
+    def __call__(self, remaining: float) -> float:
+        """Return the rate when a share ``remaining`` (1 to 0) of training is left."""
+        return self.rate * (0.1 + 0.9 * remaining)
+
+    def adapt(self, divergence: float) -> None:
+        """Adapt the rate to the divergence of the last update."""
+        config = self._config
+        if divergence > 2 * config.target_kl:
+            self.rate = max(self.rate / 1.5, 0.03 * config.learning_rate)
+        elif divergence < config.target_kl / 2:
+            self.rate = min(self.rate * 1.5, config.highest_rate)
+
+
+@contextmanager
+def training_threads(count: int) -> Iterator[None]:
+    """Let torch use some threads, and no subnormal numbers, which are slow.
+
+    The latter is of the whole process, so it must not stay: others count on them.
+    """
+    torch.set_num_threads(count)
+    torch.set_flush_denormal(True)
+    try:
+        yield
+    finally:
+        torch.set_flush_denormal(False)
+
+
+def make_logger(folder: Path, steps: int) -> Logger:
+    """Return a logger to CSV and tensorboard; a resumed run begins another CSV."""
+    name = f"progress-{steps}.csv" if steps else "progress.csv"
+    table = CSVOutputFormat(str(folder / name))
+    return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
+
+
+def note_step(logger: Logger, env: AirHockeyVecEnv) -> None:
+    """Log the reward terms of the last step, and scores against opponents."""
+    for name, value in env.last_terms.items():
+        logger.record_mean(f"reward/{name}", value)
+    if isinstance(env, SelfPlayVecEnv):
+        for name, value in env.scores.items():
+            logger.record(f"score/{name}", value)
