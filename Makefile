@@ -21,6 +21,7 @@ $(READY): pyproject.toml constraints.txt
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,ecosystem,dev]'
 	$(BIN)/pip install --quiet --constraint constraints.txt --no-deps robosuite
+	@echo "what pip says of robosuite above does no harm: it comes without what it names"
 	$(BIN)/pip install --quiet --constraint constraints.txt mujoco scipy termcolor tqdm
 	touch $@
 

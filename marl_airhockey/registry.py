@@ -237,6 +237,10 @@ def _build(
     for option in options:
         if option not in known:
             raise ValueError(unknown_name(what, option, known))
+    if isinstance(make, type) and inspect.isabstract(make):
+        names = make.__abstractmethods__  # type: ignore[attr-defined]
+        missing = ", ".join(sorted(names))
+        raise ValueError(f"{make.__name__} lacks {missing}")
     try:
         inspect.signature(make).bind(**options)
     except TypeError as error:

@@ -50,7 +50,7 @@ class HitGoal(GoalScenario):
         return {
             **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
-            "goal": starts.uniform_box(rng, (0.05, 0.738), (-0.205, 0.205)),
+            "goal": starts.uniform_box(rng, (0.05, 0.60), (-0.205, 0.205)),
             "near": np.full(worlds, np.inf),
             "entered": np.zeros(worlds, np.bool_),
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,15 +23,15 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
-from marl_airhockey.toolkit.shots import legal_shots, shots_at
+from marl_airhockey.toolkit.shots import draw_shots, playable_puck
 
 
 @dataclass(frozen=True, kw_only=True)
 class HitGoalVelocity(GoalScenario):
     """Task that rewards the best match of the rising puck in position and velocity.
 
-    The goal is a point of a legal shot at this very puck (see `shots.legal_shots`), so
-    that it is feasible.
+    The goal is a point of a legal shot at this very puck under the physics of the
+    episode (see `shots.draw_shots`), so that it is feasible.
     """
 
     seconds: float = 10.0
@@ -50,24 +51,34 @@ class HitGoalVelocity(GoalScenario):
         return Scene(self.table_geometry, seats, pucks=1, goal_lines=(home,), path=True)
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(rng, self.scene)
-        puck, goal = legal_shots(rng, self.scene)
+        state, puck = starts.falling(rng, self.scene), playable_puck(rng, self.scene)
         state.position[:, 1], state.velocity[:, 1] = puck[:, :2], puck[:, 2:4]
         state.spin[:, 1] = puck[:, 4] / self.scene.table.puck_radius
-        return state, self._memory(state, rng, goal)
+        return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
-        return self._memory(state, rng, shots_at(rng, self.scene, state))
-
-    def _memory(self, state: State, rng: RandomStreams, goal: Array) -> Memory:
         worlds = len(rng)
         return {
             **super().initial_memory(state, rng),
             "gap": starts.puck_gap(state),
-            "goal": goal[:, :2].copy(),
-            "goal_velocity": goal[:, 2:].copy(),
+            "goal": np.zeros((worlds, 2)),
+            "goal_velocity": np.zeros((worlds, 2)),
             "score": np.zeros(worlds),
             "entered": np.zeros(worlds, np.bool_),
+        }
+
+    def aim(
+        self,
+        rng: RandomStreams,
+        state: State,
+        memory: Memory,
+        physics: Mapping[str, Array],
+    ) -> Memory:
+        goal = draw_shots(rng, self.scene, state, physics)
+        return {
+            **memory,
+            "goal": goal[:, :2].copy(),
+            "goal_velocity": goal[:, 2:].copy(),
         }
 
     def update_memory(self, t: Transition) -> Memory:

@@ -34,7 +34,7 @@ class Juggle(Scenario):
     seconds: float = 15.0
     pucks: int = 1
     """Number of pucks, 1 or 2."""
-    lift: float = 0.2
+    lift: float = 0.3
     """Height to which a hit must raise the puck's centre (m)."""
     hits: int = 4
     """Number of hits that is a success."""

@@ -53,7 +53,7 @@ class MoveBlock(Scenario):
         state = starts.falling(rng, self.scene)
 
         def sample(some: RandomStreams) -> Array:
-            return starts.uniform_box(some, (0.05, 0.70), (-0.229, 0.229))
+            return starts.uniform_box(some, (0.05, 0.40), (-0.229, 0.229))
 
         def aside(rows: Array) -> Array:
             # The puck must not fall onto the block.

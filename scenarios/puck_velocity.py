@@ -27,7 +27,7 @@ class PuckVelocity(Scenario):
     """Task that rewards the best upward speed after a touch, and the approach."""
 
     seconds: float = 5.0
-    fast: float = 1.5
+    fast: float = 1.2
     """Wanted upward speed (m/s)."""
 
     @cached_property

@@ -31,7 +31,7 @@ class Strike(Scenario):
     """
 
     seconds: float = 2.0
-    fast: float = 0.9
+    fast: float = 0.8
     """Wanted speed of the puck (m/s)."""
     distance: float = 0.3
     """Wanted distance of the puck from its start (m)."""

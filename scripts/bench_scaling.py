@@ -22,7 +22,7 @@ from rich.table import Table
 
 import marl_airhockey as ah
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES

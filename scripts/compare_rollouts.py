@@ -24,7 +24,7 @@ from rich.table import Table
 import marl_airhockey as ah
 
 WORLDS, STEPS = 3, 200
-PROFILES = ("ideal", "robot")
+PROFILES = ("ideal", "ur5e")
 TOLERANCE = {"numba": 0.0, "pymunk": 1e-9}
 ON_PURPOSE = {"free_for_all": 1e-15}
 """Paddles beside a retired one: their acceleration, and so a cost, is rounded anew."""

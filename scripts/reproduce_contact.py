@@ -72,7 +72,7 @@ CASES: tuple[tuple[str, str, dict[str, Any], Callable[[int], ActionRule]], ...] 
 def main(
     steps: Annotated[int, typer.Option(help="Control steps of each seed.")] = 2000,
     seeds: Annotated[int, typer.Option(help="How many.")] = 5,
-    profile: Annotated[str, typer.Option(help="ideal or robot.")] = "robot",
+    profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ur5e",
 ) -> None:
     """Measure all cases and print a table."""
     table = Table(title=f"{seeds} seeds of {steps} control steps, {profile} profile")

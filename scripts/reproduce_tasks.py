@@ -1,7 +1,7 @@
 """Train every task with its preset over several seeds, print the table, draw curves.
 
     python scripts/reproduce_tasks.py --seeds 5 --jobs 2 --out runs/tasks
-    python scripts/reproduce_tasks.py --profile robot --seeds 1 --out runs/robot
+    python scripts/reproduce_tasks.py --profile ur5e --seeds 1 --out runs/ur5e
 
 A run that is there already is not trained again, so the script can be stopped and
 started. Success is that of the last policy (no checkpoint is picked) over the test
@@ -114,7 +114,7 @@ def main(
         PAPER
     ),
     seeds: Annotated[int, typer.Option(help="Seeds 0 .. n - 1.")] = 5,
-    profile: Annotated[str, typer.Option(help="ideal or robot.")] = "ideal",
+    profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ideal",
     jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/tasks"),
     markdown: Annotated[Path | None, typer.Option(help="Write the table here.")] = None,

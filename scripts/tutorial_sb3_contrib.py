@@ -36,7 +36,7 @@ def main(
 ) -> None:
     """Train both, one after the other."""
     torch.set_num_threads(1)
-    juggle = ah.make_sb3_vec("juggle", 32, profile="robot", observe="velocity")
+    juggle = ah.make_sb3_vec("juggle", 32, profile="ur5e", observe="velocity")
     recurrent = RecurrentPPO(
         "MlpLstmPolicy",
         juggle,

@@ -13,15 +13,19 @@ from marl_airhockey.cli.options import (
     app,
     console,
 )
-from marl_airhockey.envs.describe import describe, summary
+from marl_airhockey.core.profiles import PROFILES
+from marl_airhockey.envs.describe import describe, describe_profile, summary
+from marl_airhockey.registry import runs_code
 
 
 @app.command("list")
 def list_scenarios(
-    scenario: Annotated[str | None, typer.Argument(help="Describe this one.")] = None,
+    scenario: Annotated[
+        str | None, typer.Argument(help="Describe this scenario or profile.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List scenarios, drivers and backends, or describe one scenario."""
+    """List all there is, or describe a scenario or a profile."""
     if scenario is None:
         data = summary()
         if as_json:
@@ -34,8 +38,18 @@ def list_scenarios(
         console.print("drivers: ", ", ".join(data["drivers"]))
         console.print("zoo:     ", ", ".join(data["zoo"]))
         console.print("backends:", ", ".join(data["backends"]))
+        console.print("profiles:", ", ".join(data["profiles"]))
         return
-    data = describe(scenario)
+    if scenario in PROFILES:
+        _show_profile(scenario, as_json)
+        return
+    try:
+        data = describe(scenario)
+    except ValueError as error:
+        if runs_code(scenario):
+            raise
+        profiles = ", ".join(PROFILES)
+        raise ValueError(f"{error}; or a profile: {profiles}") from error
     if as_json:
         console.print_json(json.dumps(data))
         return
@@ -49,4 +63,17 @@ def list_scenarios(
             shown = {**row, "meaning": ""} if row.get("meaning") == above else row
             above = row.get("meaning", "")
             table.add_row(*(str(v) for v in shown.values()))
+        console.print(table)
+
+
+def _show_profile(name: str, as_json: bool) -> None:
+    data = describe_profile(name)
+    if as_json:
+        console.print_json(json.dumps(data))
+        return
+    console.print(f"[bold]{name}[/bold]  {data['what']}\ndelay: {data['delay']}\n")
+    if data["parameters"]:
+        table = Table(*data["parameters"][0])
+        for row in data["parameters"]:
+            table.add_row(*(str(v) for v in row.values()))
         console.print(table)

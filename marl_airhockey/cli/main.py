@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import traceback
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -32,6 +34,8 @@ def _tell_version(given: bool) -> None:
 
 # Importing these modules adds their commands to the application.
 __all__ = ["bench", "evaluate", "listing", "main", "new", "train", "warm", "watch"]
+LIBRARIES = {"marl_airhockey", "site-packages", "bin", "scenarios", "agents"}
+"""Folders of code that is not an author's own."""
 app.command()(league.league)
 app.command()(play.play)
 app.command()(transfer.transfer)
@@ -62,8 +66,15 @@ def main() -> None:
     try:
         app()
     except (ValueError, RuntimeError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {error}{_place(error)}", file=sys.stderr)
         sys.exit(1)
+
+
+def _place(error: BaseException) -> str:
+    """Return the line of an author's own file that an error comes from, if any."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [f for f in frames if LIBRARIES.isdisjoint(Path(f.filename).parts)]
+    return f" ({own[-1].filename}, line {own[-1].lineno})" if own else ""
 
 
 if __name__ == "__main__":

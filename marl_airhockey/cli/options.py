@@ -29,7 +29,7 @@ console = Console()
 Scenario = Annotated[str, typer.Option("--scenario", "-s", help="Name of a scenario.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Backend = Annotated[str, typer.Option(help="Physics.")]
-Profile = Annotated[str, typer.Option(help="ideal, or robot: delays and noise.")]
+Profile = Annotated[str, typer.Option(help="ideal, or a robot's: ur5e, gantry.")]
 Options = Annotated[
     list[str] | None,
     typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),

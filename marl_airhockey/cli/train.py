@@ -94,10 +94,13 @@ def train(
         **given,
     }
     config = preset(scenario, changes)
-    updates = -(-config.total_steps // config.rollout)
-    if steps is not None and steps != updates * config.rollout and not as_json:
-        whole, one = updates * config.rollout, config.rollout
-        console.print(f"steps: {whole:,}, as {updates} whole updates of {one:,}")
+    if steps is not None and not as_json:
+        del changes["total_steps"]
+        updates, usual = -(-steps // config.rollout), preset(scenario, changes)
+        console.print(
+            f"steps: {updates * config.rollout:,}, {updates} updates of "
+            f"{config.rollout:,}; the preset has {usual.total_steps:,}"
+        )
     folder = out or Path("runs") / f"{find_scenario(scenario).name}-{seed}"
     _train(config, folder, scenario, as_json)
 

@@ -22,7 +22,9 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
-from marl_airhockey.core.physics import PARAMETERS, PROFILES, load_physics
+from marl_airhockey.core.parameters import PARAMETERS
+from marl_airhockey.core.physics import load_physics
+from marl_airhockey.core.profiles import PROFILES
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend, find_scenario, make_agent
 from marl_airhockey.toolkit.trust import require_trust
@@ -47,7 +49,7 @@ def transfer(
     ] = "numba,pymunk,robosuite",
     profile: Annotated[
         str, typer.Option(help="Profiles, comma-separated.")
-    ] = "ideal,robot",
+    ] = "ideal,ur5e",
     episodes: Annotated[int, typer.Option(help="Of each.", min=1)] = 200,
     fine_tune: Annotated[
         int,
@@ -70,7 +72,7 @@ def transfer(
     backends, profiles = _list(to), _list(profile)
     _check_names(backends, profiles)
     find_scenario(scenario, **settings(option))
-    policies = _policies(scenario, policy or [], fine_tune, seed, folder)
+    policies = _policies(scenario, policy or [], profiles, fine_tune, seed, folder)
     with bar() as progress:
         total = len(policies) * len(backends) * len(profiles)
         task = progress.add_task("measuring", total=total, note="")
@@ -96,13 +98,19 @@ def transfer(
 
 
 def _policies(
-    scenario: str, names: list[str], fine_tune: int, seed: int, folder: Path
+    scenario: str,
+    names: list[str],
+    profiles: list[str],
+    fine_tune: int,
+    seed: int,
+    folder: Path,
 ) -> dict[str, Driver]:
     """Return the policies to measure, by name, after all training that they need.
 
     Args:
         scenario: what they play.
         names: of policies or runs; if empty, one is trained in each profile.
+        profiles: names of profiles.
         fine_tune: steps by which each run is trained on; 0 for none.
         seed: of training.
         folder: of the runs.
@@ -113,7 +121,7 @@ def _policies(
         make_agent(name)
     names = list(names)
     if not names:
-        for kind in PROFILES:
+        for kind in profiles:
             names.append(_run(folder / kind, pretraining_config(scenario, kind, seed)))
     if fine_tune:
         runs = [n for n in names if (Path(n) / "config.toml").exists()]
@@ -175,7 +183,7 @@ def _run(folder: Path, config: TrainConfig) -> str:
         run = TrainingRun(load_config(folder / "config.toml"), folder)
         if run.config != config:
             raise ValueError(f"{folder} holds another run: say another --out")
-        if run.steps_left > 0:
+        if run.steps_left > 0 and (folder / "last.zip").exists():
             require_trust(folder / "last.zip")
     train_with_progress(None if begun else config, folder)
     return str(folder)

@@ -71,7 +71,8 @@ class Backend(ABC):
     exact: ClassVar[bool]
     """True if row i does not depend on the number of worlds, to the bit."""
     ideal: ClassVar[bool] = True
-    """True if paddles move exactly as commanded and contacts take no time."""
+    """True if paddles move exactly as commanded and contacts take no time. Where they
+    do not, no servo is simulated besides."""
     realtime: ClassVar[bool] = False
     """True if a step takes as long as it lasts."""
     timestep: ClassVar[float | None]
@@ -121,6 +122,14 @@ class Backend(ABC):
     @abstractmethod
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         """Set the parameters of some worlds, by index (W,); values are (B,) each."""
+
+    def key_scatter(self, keys: Array, worlds: Array) -> None:
+        """Set the keys (B,), uint64, of the contacts' scatter in some worlds, by index.
+
+        Their collisions are counted from 0 again. Nothing happens in a backend whose
+        contacts do not scatter.
+        """
+        return None
 
     def reset(self, state: State, worlds: Array) -> None:
         """Begin anew in some worlds, by index (W,), from rows of a state of all B.

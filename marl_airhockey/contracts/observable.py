@@ -12,19 +12,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 
 OBSERVE = ("velocity", "history", "pixels")
-"""Forms of the puck in observations: position and velocity; the last five sensed
-positions with a visibility flag, as a camera gives them; or pictures."""
+"""Forms of the puck in observations: position and velocity; the last sensed positions,
+each with a visibility flag and the age of its frame, as a camera gives them; or
+pictures."""
 
 
 HISTORY = 5
-
-
+"""Number of sensed positions of a puck in a history."""
+PENDING = 2
+"""Number of the last actions in a history, which may still be on their way."""
 FRAMES = 3
+"""Number of pictures on top of each other in pixels."""
 
 
 class Column(NamedTuple):
@@ -92,11 +96,18 @@ class EgoView:
     """View from every seat of a sensed state and the scenario's memory."""
 
     def __init__(
-        self, state: State, memory: Memory, history: Array, scope: ObservationContext
-    ):
+        self,
+        state: State,
+        memory: Memory,
+        history: Array,
+        asked: Array,
+        scope: ObservationContext,
+    ) -> None:
         self.state, self.memory, self.scope = state, memory, scope
         self.history = history
-        """(..., HISTORY, pucks, 3) sensed positions and visibility, newest last"""
+        """(..., HISTORY, pucks, 4) sensed x, y, visible, age (s), newest last"""
+        self.asked = asked
+        """(..., PENDING, S, 2) actions asked for, ego frames, newest last"""
         self.own = self._own(state.paddle)
         """(..., S, 2) each seat's own paddle, m"""
         self.own_velocity = self._own(state.paddle_velocity)
@@ -107,6 +118,16 @@ class EgoView:
         """(..., S, pucks, 2) m/s"""
         self.puck_edge = state.puck_edge[..., None, :]
         """(..., 1, pucks) m/s, the same from every seat"""
+
+    def kept(self, name: str) -> Array:
+        """Return an array of the scenario's memory.
+
+        Raises:
+            ValueError: there is none of this name.
+        """
+        if name not in self.memory:
+            raise ValueError(unknown_name("memory", name, self.memory))
+        return self.memory[name]
 
     def rotate(self, vectors: Array) -> Array:
         """Rotate (..., n, 2) of the table frame to ego frames, (..., S, n, 2)."""

@@ -7,6 +7,7 @@ and a stored dataset. Leading axes are the caller's.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -98,6 +99,20 @@ class Scenario(ABC):
         replay, a real table. Scenarios add their own to what this returns.
         """
         return no_touches(state) if state.bodies.pucks else {}
+
+    def aim(
+        self,
+        rng: RandomStreams,
+        state: State,
+        memory: Memory,
+        physics: Mapping[str, Array],
+    ) -> Memory:
+        """Return the memory of an episode with what its physics decides, one row each.
+
+        Called after `reset` and `initial_memory`; most scenarios leave it alone.
+        ``physics`` holds the parameters of the episode by name, (W,) each.
+        """
+        return memory
 
     def update_memory(self, t: Transition) -> Memory:
         """Return what changes in the memory by a step.
@@ -275,9 +290,16 @@ class GoalScenario(Scenario):
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
         """(...) 1 where the goal is met, else 0; of goals alone."""
 
+    def shown_reward(self, achieved: Array, desired: Array) -> Array:
+        """(...) `goal_reward` of goals from observations, in double precision."""
+        goals = (np.asarray(goal, np.float64) for goal in (achieved, desired))
+        return self.goal_reward(*goals)
+
     def goal_met(self, state: State, memory: Memory) -> Array:
-        reward = self.goal_reward(self.achieved(state, memory), self.desired(memory))
-        met: Array = reward > 0
+        # As an observation shows them, so that `compute_reward` agrees to the bit.
+        goals = self.achieved(state, memory), self.desired(memory)
+        shown = [goal.astype(np.float32).astype(np.float64) for goal in goals]
+        met: Array = self.goal_reward(*shown) > 0
         return met
 
 

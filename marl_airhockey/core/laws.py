@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from marl_airhockey.core.physics import PUCK_SPEED_CAP, SLOWEST_BOUNCE
+from marl_airhockey.core.parameters import PUCK_SPEED_CAP, SLOWEST_BOUNCE
 
 Motion = tuple[float, float, float, float]
 """Distance along x and y, m, and velocity after it, m/s."""

@@ -16,14 +16,15 @@ from numba import njit
 
 from marl_airhockey.types import Array
 
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 _30, _27, _31, _11 = (np.uint64(n) for n in (30, 27, 31, 11))
 
 
 @njit(cache=True)
-def _mix(z: Any) -> Any:
+def mix(z: Any) -> Any:
+    """Return the hash of a 64-bit number."""
     z = (z ^ (z >> _30)) * _MIX_1
     z = (z ^ (z >> _27)) * _MIX_2
     return z ^ (z >> _31)
@@ -34,10 +35,10 @@ def _begin(
     keys: Array, counts: Array, rows: Array, seeds: Array, episodes: Array, salts: Array
 ) -> None:
     for row in rows:
-        world = _mix(np.uint64(seeds[row]) * _GOLDEN + _GOLDEN)
+        world = mix(np.uint64(seeds[row]) * GOLDEN + GOLDEN)
         for k in range(len(salts)):
-            episode = _mix(np.uint64(episodes[row]) * _GOLDEN + salts[k])
-            keys[k, row] = _mix(world ^ episode)
+            episode = mix(np.uint64(episodes[row]) * GOLDEN + salts[k])
+            keys[k, row] = mix(world ^ episode)
             counts[k, row] = 0
 
 
@@ -47,7 +48,7 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
     for i in range(len(rows)):
         key, count, n = keys[rows[i]], counts[rows[i]], out.shape[1]
         for k in range(n):
-            bits = _mix(key + (count + np.uint64(k + 1)) * _GOLDEN)
+            bits = mix(key + (count + np.uint64(k + 1)) * GOLDEN)
             out[i, k] = (bits >> _11) * 2.0**-53
         counts[rows[i]] = count + np.uint64(n)
 
@@ -124,6 +125,10 @@ class StreamSet:
             episodes: (W,) integer episode numbers.
         """
         _begin(self._keys, self._counts, rows, seeds, episodes, self._salts)
+
+    def keys(self, purpose: str) -> Array:
+        """Return the keys (W,) of the streams for a purpose, uint64, not a copy."""
+        return np.asarray(self._keys[self._place[purpose]])
 
     def of(self, purpose: str, rows: Array | None = None) -> RandomStreams:
         """Return the streams for a purpose, shared, of some worlds; None for all."""

@@ -38,9 +38,8 @@ def make_seat(
 ) -> Seat:
     """Return a seat of a kind at a side of a table.
 
-    ``robot``: what a UR5e can hold with its base 0.22 m behind its edge, a box of
-    0.42 x 0.50 m that begins 78 mm from the edge, with far corners cut at the slope of
-    0.8 that the paper's authors use, as far as it lies in the side's territory.
+    ``robot``: what a UR5e can hold with its base 0.22 m behind its side, the table's
+    `robot_reach`, as far as it lies in the side's territory.
     ``arcade``: all of the territory, at what an arm of a person or a gantry reaches.
     Centres keep a paddle's radius inside of it.
 
@@ -57,17 +56,8 @@ def make_seat(
     ego = table.rotation(side).T
     normals = table.normals @ ego
     if kind == "robot":
-        near, far, wide, cut = edge + 0.0782, edge + 0.4982, 0.25, 0.08
-        slope = cut / 0.8
-        box = [
-            (near, wide),
-            (near, -wide),
-            (far - cut, -wide),
-            (far, -wide + slope),
-            (far, wide - slope),
-            (far - cut, wide),
-        ]
-        polygon, speed, acceleration = np.array(box), 0.7, 7.0
+        polygon, speed, acceleration = np.array(table.robot_reach), 0.7, 7.0
+        polygon[:, 0] += edge
     else:
         polygon, speed, acceleration = np.asarray(table.vertices) @ ego, 5.0, 50.0
     for normal, offset in zip(normals, table.offsets, strict=True):

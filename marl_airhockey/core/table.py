@@ -13,11 +13,25 @@ from functools import cached_property
 import numpy as np
 
 from marl_airhockey.core.geometry import _cross
-from marl_airhockey.core.physics import PRESETS
+from marl_airhockey.core.parameters import PRESETS
 from marl_airhockey.types import Array
 
 GRAVITY = 9.81
 """Standard gravity (m/s2)."""
+
+
+BOX = (
+    *((0.0782, 0.25), (0.0782, -0.25), (0.4182, -0.25)),
+    *((0.4982, -0.15), (0.4982, 0.15), (0.4182, 0.25)),
+)
+"""What an arm needs on the standard table: a box with far corners cut at the slope of
+0.8 that the paper's authors use."""
+WIDE = (
+    *((0.0782, 0.36), (0.0782, -0.36), (0.42, -0.36), (0.47, -0.25), (0.51, -0.08)),
+    *((0.51, 0.08), (0.47, 0.25), (0.42, 0.36)),
+)
+"""All that a UR5e holds with its base 0.22 m behind the side: no joint is faster than
+0.9 pi rad/s at 0.7 m/s in any direction, flat or tilted, by inverse kinematics."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +49,8 @@ class Table:
     """Radius of a paddle (m; 3.75 in diameter)."""
     puck_radius: float = 0.03175
     """Radius of a puck (m; 2.5 in diameter)."""
+    robot_reach: tuple[tuple[float, float], ...] = BOX
+    """Convex polygon that a UR5e at a side holds: x from the side, y, m."""
     physics: dict[str, float] = field(default_factory=dict, hash=False)
     """Physical parameters that come with this table, by name."""
 
@@ -103,7 +119,7 @@ class Table:
 
 TABLES: dict[str, Table] = {
     "standard": Table.rectangle(1.6764, 0.6096),
-    "full_size": Table.rectangle(1.9304, 0.8636),
+    "full_size": replace(Table.rectangle(1.9304, 0.8636), robot_reach=WIDE),
     "ubc_pro": replace(
         Table.rectangle(2.362, 1.144), puck_radius=0.0413, paddle_radius=0.0505
     ),

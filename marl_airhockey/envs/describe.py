@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario, Transition
+from marl_airhockey.core.parameters import PARAMETERS
+from marl_airhockey.core.profiles import PROFILES, delay_of
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
 from marl_airhockey.registry import (
@@ -63,7 +65,28 @@ def summary() -> dict[str, Any]:
         "drivers": [*agent_names(), *plugin_names("drivers")],
         "zoo": zoo_names(),
         "backends": backend_names(),
+        "profiles": list(PROFILES),
     }
+
+
+def describe_profile(name: str) -> dict[str, Any]:
+    """Return what a profile senses and from which ranges its physics is drawn."""
+    profile = PROFILES[name]
+    least, longest = (1000.0 * end for end in delay_of(profile))
+    follows = {key: follow.range for key, follow in profile.follows.items()}
+    times = {f"{key} (times)": pair for key, pair in profile.shares.items()}
+    rows = [
+        {
+            "parameter": key,
+            "low": round(pair[0], 6),
+            "high": round(pair[1], 6),
+            "unit": "" if key in times else PARAMETERS[key].unit,
+            "meaning": PARAMETERS[key.partition(" ")[0]].meaning,
+        }
+        for key, pair in {**profile.ranges, **follows, **times}.items()
+    ]
+    delay = f"{least:.0f} .. {longest:.0f} ms from an event to half of the answer"
+    return {"name": name, "what": profile.what, "delay": delay, "parameters": rows}
 
 
 def describe(name: str) -> dict[str, Any]:

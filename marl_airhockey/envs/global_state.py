@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from gymnasium import spaces
 
-from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.core.parameters import PUCK_SPEED_CAP
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.world import World
@@ -33,7 +33,7 @@ class GlobalState:
         first = np.zeros(1, np.int64)
         rng = RandomStreams.keyed(first, first, "start")
         self._memory: Memory = world.scenario.reset(rng, 1)[1]
-        self._turns = scene.bodies.blocks if scene.block_shape == "square" else 0
+        self._rotating = scene.bodies.blocks if scene.block_shape == "square" else 0
         self._bound = self._bounds()
         self.labels = tuple(self._names())
         """Name of each number."""
@@ -49,9 +49,9 @@ class GlobalState:
         fastest = self._world.physics.highest("paddle_speed")
         motion[scene.bodies.paddle, 2:] = fastest
         spins = np.full(pucks, PUCK_SPEED_CAP)
-        turns = np.full(self._turns, np.pi / 2)
+        angles = np.full(self._rotating, np.pi / 2)
         kept = np.full(sum(array[0].size for array in self._memory.values()), MOST)
-        parts = motion.ravel(), spins, turns, kept, [1.0]
+        parts = motion.ravel(), spins, angles, kept, [1.0]
         return np.concatenate(parts).astype(np.float32)
 
     def _names(self) -> Iterator[str]:
@@ -61,7 +61,7 @@ class GlobalState:
             for i in range(count):
                 yield from (f"{kind}_{i}.{x}" for x in ("x", "y", "vx", "vy"))
         yield from (f"puck_{i}.spin" for i in range(bodies.pucks))
-        yield from (f"block_{i}.turn" for i in range(self._turns))
+        yield from (f"block_{i}.turn" for i in range(self._rotating))
         for name, array in self._memory.items():
             for place in np.ndindex(array.shape[1:]):
                 yield "_".join(map(str, (name, *place)))
@@ -71,7 +71,7 @@ class GlobalState:
         """Return (B, n) float32, freshly allocated."""
         world, bodies = self._world, self._world.scene.bodies
         state, memory = world.get_state()
-        b, first = world.num_worlds, bodies.movers - self._turns
+        b, first = world.num_worlds, bodies.movers - self._rotating
         motion = np.concatenate([state.position, state.velocity], -1)
         kept = [memory[name].reshape(b, -1) for name in self._memory]
         parts = (

@@ -99,7 +99,7 @@ class AirHockeyGoalEnv(AirHockeySingleEnv):
         """(...) float32: 1 where the goal is met; of goals (..., goal) alone."""
         scenario = self.parallel.world.scenario
         assert isinstance(scenario, GoalScenario)
-        return np.asarray(scenario.goal_reward(achieved, desired), np.float32)
+        return np.asarray(scenario.shown_reward(achieved, desired), np.float32)
 
 
 def check_one_open(world: World) -> None:

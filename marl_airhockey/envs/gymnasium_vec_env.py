@@ -76,7 +76,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
     @property
     def observation_labels(self) -> tuple[str, ...]:
         """Name of each element of the (flat part of a single) observation."""
-        return self.world.observer.layout.labels
+        return self.world.observer.labels
 
     @property
     def physics(self) -> dict[str, Array]:

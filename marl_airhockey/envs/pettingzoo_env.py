@@ -124,7 +124,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     def observation_labels(self, agent: str) -> tuple[str, ...]:
         """Return the name of each element of the (flat part of the) observation."""
         self._observation_spaces[agent]
-        return self.world.observer.layout.labels
+        return self.world.observer.labels
 
     @property
     def state_labels(self) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ class AirHockeyVecEnv(VecEnv):
     @property
     def observation_labels(self) -> tuple[str, ...]:
         """Name of each element of the (flat part of a slot's) observation."""
-        return self.world.observer.layout.labels
+        return self.world.observer.labels
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Give world i the seed + i at the next reset."""
@@ -143,7 +143,7 @@ class AirHockeyVecEnv(VecEnv):
         """(...) float32: 1 where the goal is met; for goals="dict"."""
         scenario = self.world.scenario
         assert isinstance(scenario, GoalScenario)
-        return np.asarray(scenario.goal_reward(achieved, desired), np.float32)
+        return np.asarray(scenario.shown_reward(achieved, desired), np.float32)
 
     def get_images(self) -> Sequence[Array | None]:
         """Return a picture (H, W, 3) uint8 of each world."""

@@ -106,7 +106,7 @@ def evaluate(
             `build_world`.
 
     Raises:
-        ValueError: a seat without a driver, named.
+        ValueError: a seat without a driver, or a reward term that is nan, named.
     """
     keywords = keywords if keywords is not None else {}
     if episodes < 1:
@@ -170,6 +170,9 @@ class _EpisodeStatistics:
         self._actions.append(np.where(live[:, None], world.action[:, 0], np.nan))
         ended = (result.terminated | result.truncated) & live
         episode = world.episode
+        if np.isnan(episode.returns).any():
+            bad = [name for name, term in world.terms.items() if np.isnan(term).any()]
+            raise ValueError(f"{world.scenario.name}: reward terms {bad} are nan")
         self.success[ended] = episode.success[ended, 0]
         self.first_shot[ended] = episode.first_shot[ended]
         self.returns[ended] = episode.returns[ended, 0]

@@ -69,11 +69,8 @@ def play_league(
     wins[a, b], wins[b, a] = won.sum(1).T
     draws[a, b] = draws[b, a] = (~won.any(-1)).sum(1)
     goals[a, b], goals[b, a] = margin.reshape(len(pairs), games, 2).mean(1).T
-    ratings = elo(wins + 0.5 * draws, wins + wins.T + draws)
-    spread = _rating_intervals(wins, draws, pairs, seed)
-    # One-sided results lie at the edge of what is likely behind them.
-    spread[:, 0] = np.minimum(spread[:, 0], ratings)
-    spread[:, 1] = np.maximum(spread[:, 1], ratings)
+    low, ratings, high = _ratings(wins, draws, pairs, seed)
+    spread = np.stack([low, high], -1)
     return Standings(scenario, names, games, wins, draws, goals, ratings, spread)
 
 
@@ -101,8 +98,8 @@ def _arrays(results: GameResults) -> tuple[Array, Array, Array]:
     return results.won, results.margin, results.seconds
 
 
-def _rating_intervals(wins: Array, draws: Array, pairs: Array, seed: int) -> Array:
-    """Return (E, 2) 95 % intervals of ratings.
+def _ratings(wins: Array, draws: Array, pairs: Array, seed: int) -> Array:
+    """Return (3, E) lower ends, medians and upper ends of ratings, 95 % between ends.
 
     Ratings are drawn from what the shares of won, drawn and lost games of each pair may
     be (Dirichlet, Jeffreys' prior), so that 100 wins of 100 leave a doubt, too.
@@ -117,4 +114,4 @@ def _rating_intervals(wins: Array, draws: Array, pairs: Array, seed: int) -> Arr
         score[a, b] = (shares[:, 0] + 0.5 * shares[:, 1]) * played[a, b]
         score[b, a] = played[a, b] - score[a, b]
         found.append(elo(score, played))
-    return np.quantile(found, [0.025, 0.975], axis=0).T
+    return np.quantile(found, [0.025, 0.5, 0.975], axis=0)

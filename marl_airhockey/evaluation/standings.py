@@ -29,7 +29,7 @@ class Standings:
     margin: Array
     """(E, E) mean of goals for minus goals against"""
     ratings: Array
-    """(E,) Elo ratings, 1000 on average"""
+    """(E,) Elo ratings, 1000 on average: the middle of what the games allow"""
     rating_intervals: Array
     """(E, 2) 95 % intervals of the ratings"""
 

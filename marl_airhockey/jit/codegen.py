@@ -11,6 +11,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
@@ -175,7 +176,7 @@ class Loaded(NamedTuple):
 def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Loaded:
     """Load a module and compile its ``kernel`` for its ``SIGNATURE`` with numba.
 
-    A compilation that is not in the cache is announced on stderr, once per name.
+    What is not in the cache is announced on stderr, once for several in a row.
 
     Args:
         source: text of the module.
@@ -186,7 +187,8 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
     if digest not in _loaded:
         path = cache_folder() / f"loop_{digest}.py"
         if not path.exists():
-            _announce(name)
+            if time.monotonic() - _compiled.get(name, -np.inf) > PAUSE:
+                print(f"marl_airhockey: compiling {name} once", file=sys.stderr)
             part = path.with_suffix(f".{os.getpid()}")
             part.write_text(source)
             part.replace(path)
@@ -200,12 +202,13 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
         vars(module).update(names or {})
         compiled = njit(module.SIGNATURE, cache=True, nogil=True, error_model="numpy")
         _loaded[digest] = Loaded(compiled(module.kernel), module)
+        _compiled[name] = time.monotonic()
     return _loaded[digest]
 
 
-@cache
-def _announce(name: str) -> None:
-    print(f"marl_airhockey: compiling {name}, once per machine", file=sys.stderr)
+PAUSE = 2.0
+"""Time after a compilation (s) from which the next one of its name is announced."""
+_compiled: dict[str, float] = {}
 
 
 CALLED = ("backends", "contracts", "core", "jit")

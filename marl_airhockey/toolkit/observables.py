@@ -11,12 +11,13 @@ import numpy as np
 
 from marl_airhockey.contracts.observable import (
     HISTORY,
+    PENDING,
     Column,
     EgoView,
     Observable,
     ObservationContext,
 )
-from marl_airhockey.core.physics import PUCK_SPEED_CAP
+from marl_airhockey.core.parameters import PUCK_SPEED_CAP
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.touches import touched
 from marl_airhockey.types import Array
@@ -24,17 +25,27 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class OwnPaddle(Observable):
-    """Position and velocity of the seat's own paddle, as its robot reports them."""
+    """Position and velocity of the seat's own paddle, as its robot reports them.
+
+    In a history also the last actions, which may still be on their way.
+    """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         centre = float(np.mean([x for x, _ in scope.scene.seats[0].reach]))
-        return scope.position_columns(
-            "own", (0.2, 0.2), centre
-        ) + scope.velocity_columns("own", scope.top_speed, scope.top_speed)
+        columns = scope.position_columns("own", (0.2, 0.2), centre)
+        columns += scope.velocity_columns("own", scope.top_speed, scope.top_speed)
+        if scope.observe == "history":
+            for ago in range(PENDING, 0, -1):
+                names = (f"own.asked[-{ago}].{axis}" for axis in "xy")
+                columns += [Column(name, -1.0, 1.0, 1.0) for name in names]
+        return columns
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[..., :2] = ego.own
-        out[..., 2:] = ego.own_velocity
+        out[..., 2:4] = ego.own_velocity
+        if ego.scope.observe == "history":
+            asked = ego.asked.swapaxes(-2, -3)
+            out[..., 4:] = asked.reshape(*asked.shape[:-2], -1)
 
 
 @dataclass(frozen=True)
@@ -96,6 +107,7 @@ class Pucks(Observable):
                 for ago in range(HISTORY - 1, -1, -1):
                     columns += scope.position_columns(f"puck_{i}[-{ago}]", (0.67, 0.25))
                     columns.append(Column(f"puck_{i}[-{ago}].seen", 0.0, 1.0, 1.0))
+                    columns.append(Column(f"puck_{i}[-{ago}].age", 0.0, 1.0, 0.1))
         return columns
 
     def write(self, ego: EgoView, out: Array) -> None:
@@ -106,9 +118,9 @@ class Pucks(Observable):
                 out[..., 5 * i + 4] = ego.puck_edge[..., i]
             return
         lead = ego.history.shape[:-3]
-        flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 3)
+        flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 4)
         place = ego.rotate(flat[..., :2])
-        seen = np.broadcast_to(flat[..., None, :, 2:], (*place.shape[:-1], 1))
+        seen = np.broadcast_to(flat[..., None, :, 2:], place.shape)
         both = np.concatenate([place, seen], -1)
         out[...] = both.reshape(out.shape)
 
@@ -187,7 +199,7 @@ class Goal(Observable):
         )
 
     def write(self, ego: EgoView, out: Array) -> None:
-        goal = ego.rotate(ego.memory["goal"][..., None, :])[..., 0, :]
+        goal = ego.rotate(ego.kept("goal")[..., None, :])[..., 0, :]
         out[..., :2] = goal
         out[..., 2:] = goal - (ego.own if self.origin == "own" else ego.puck[..., 0, :])
 
@@ -204,7 +216,7 @@ class GoalVelocity(Observable):
         return scope.velocity_columns("goal", self.most, self.unit)
 
     def write(self, ego: EgoView, out: Array) -> None:
-        out[...] = ego.rotate(ego.memory["goal_velocity"][..., None, :])[..., 0, :]
+        out[...] = ego.rotate(ego.kept("goal_velocity")[..., None, :])[..., 0, :]
 
 
 @dataclass(frozen=True)
@@ -218,7 +230,7 @@ class PossessionTime(Observable):
         return [Column(name, 0.0, self.most, 0.4 * self.most) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        out[...] = ego.memory["held"]
+        out[...] = ego.kept("held")
 
 
 @dataclass(frozen=True)
@@ -234,7 +246,7 @@ class PerSeat(Observable):
         return [Column(name, 0.0, self.most, self.most) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        value = ego.memory[self.name]
+        value = ego.kept(self.name)
         out[..., 0] = value
         out[..., 1:] = value[..., _others(ego.scope.scene)]
 
@@ -253,7 +265,7 @@ class IsThisSeat(Observable):
         return [Column(name, -1.0, 1.0, 1.0) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        who = ego.memory[self.name]
+        who = ego.kept(self.name)
         rows = who.reshape(*ego.state.time.shape, 1, -1)
         own = 1.0 + np.arange(len(ego.scope.scene.seats))[:, None]
         out[...] = np.where(rows == 0.0, 0.0, np.where(rows == own, 1.0, -1.0))
@@ -275,7 +287,7 @@ class FromMemory(Observable):
         return [Column(name, self.low, self.high, self.unit) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        kept, pucks = ego.memory[self.name], out.shape[-1]
+        kept, pucks = ego.kept(self.name), out.shape[-1]
         if kept.ndim != out.ndim - 1 or kept.shape[-1] != pucks:
             raise ValueError(
                 f"memory {self.name!r}: FromMemory shows a number for each puck, "

@@ -2,102 +2,131 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numba import njit
 
 from marl_airhockey.core.laws import impulse
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
-from marl_airhockey.toolkit.starts import falling_puck, roll
+from marl_airhockey.toolkit.starts import falling_puck, redraw, roll
 from marl_airhockey.types import Array
 
+LAWS = (
+    *("tilt", "cross_tilt", "puck_damping", "puck_drag", "wall_restitution"),
+    *("wall_restitution_slope", "wall_friction"),
+    *("paddle_restitution", "paddle_friction", "paddle_speed"),
+)
+"""Names of the parameters that a shot depends on."""
 STEP, STEPS = 0.005, 500
 """Time between points of a way (s), and their number"""
-TRIES = 20
-"""Number of shots tried at a puck before another puck is drawn."""
+TRIES = 200
+"""Number of shots tried at a puck; about 3 % are legal and reach such a place."""
+PUSH = (0.2, 0.6)
+"""Range of the paddle's speed along the normal, as a share of its top speed."""
+ASIDE = 0.24
+"""Largest |y| of the paddle (m)."""
 
 
-def legal_shots(rng: RandomStreams, scene: Scene) -> tuple[Array, Array]:
-    """Draw falling pucks, and for each a goal on a shot that a robot seat can play.
+LOW, HIGH = np.array([(-0.65, -0.30), (-0.5, 0.5), PUSH, (0.0, 1.0)]).T
+"""Ranges of a shot: x at which the puck is struck (m), angle of the normal (rad), speed
+of the paddle along it (of top speed), and which point of the way is the goal."""
+
+
+def playable_puck(rng: RandomStreams, scene: Scene) -> Array:
+    """Draw falling pucks that pass where a paddle can be, under the scene's physics.
+
+    Returns:
+        (W, 5), see `starts.falling_puck`.
+    """
+    physics = {name: p.default for name, p in PARAMETERS.items()} | scene.defaults
+    half = float(scene.table.size[1]) / 2 - scene.table.puck_radius
+
+    def passes(pucks: Array) -> Array:
+        way = roll(pucks, STEP, STEPS, half, physics)
+        near = (way[..., 0] < HIGH[0]) & (way[..., 0] > LOW[0])
+        return np.asarray((near & (np.abs(way[..., 1]) < ASIDE)).mean(-1) > 0.02)
+
+    return redraw(rng, falling_puck, passes)
+
+
+def draw_shots(
+    rng: RandomStreams, scene: Scene, state: State, physics: Mapping[str, Array]
+) -> Array:
+    """Draw a goal on a shot at puck 0 of each world that a robot seat can play.
 
     The puck falls to x in -0.65 .. -0.30 and is struck there with a contact normal
-    within 0.5 rad of straight up and a normal paddle speed of 0 .. 0.6 m/s, the
-    paddle's centre lying in x -0.74 .. -0.38 and |y| <= 0.24; it slides on with banks.
-    The goal is a random point of that path with x 0.05 .. 0.738, |y| < 0.205, within
-    30 deg of straight up and vx at least 0.5 m/s.
+    within 0.5 rad of straight up and a normal paddle speed of `PUSH`, the paddle's
+    centre lying in x -0.74 .. -0.38 and |y| <= `ASIDE`; it slides on with banks, under
+    the physics of the episode. The goal is a random point of that path with x 0.05 ..
+    0.738, |y| < 0.205, within 30 deg of straight up and vx at least 0.5 m/s. Where none
+    is found, it is the middle of these places, straight up at 0.7 m/s.
+
+    Args:
+        rng: one stream per row.
+        scene: table and seat.
+        state: rows (W,), one of which each shot begins in.
+        physics: parameters by name, (W,) each.
 
     Returns:
-        (W, 5) x, y, vx, vy, m, m/s, and speed of the edge by spin, m/s, of the puck at
-        its start, and (W, 4) x, y, vx, vy of the goal.
-
-    Raises:
-        RuntimeError: no shot was found in 100 pucks.
+        (W, 4) x, y, m, vx, vy, m/s, of the goals.
     """
-    pucks, goals = np.zeros((len(rng), 5)), np.zeros((len(rng), 4))
-    open_rows = np.arange(len(rng))
-    for attempt in range(100 * TRIES):
-        some = rng.select(open_rows)
-        if attempt % TRIES == 0:
-            pucks[open_rows] = falling_puck(some)
-        goal, found = _shoot(some, pucks[open_rows], scene)
-        goals[open_rows[found]] = goal[found]
-        open_rows = open_rows[~found]
-        if not len(open_rows):
-            return pucks, goals
-    raise RuntimeError("start: no legal shot in 100 pucks")
-
-
-def shots_at(rng: RandomStreams, scene: Scene, state: State) -> Array:
-    """Draw a goal on a legal shot (see `legal_shots`) at puck 0 of each world.
-
-    If none is found in 100 tries, the goal is one of a shot at another puck.
-
-    Returns:
-        (W, 4) x, y, vx, vy of the goal.
-    """
-    _, goals = legal_shots(rng, scene)
+    table, laws = scene.table, {name: physics[name] for name in LAWS}
+    half = float(table.size[1]) / 2 - table.puck_radius
     motion, edge = state.puck_velocity[:, 0], state.puck_edge[:, :1]
     pucks = np.concatenate([state.puck[:, 0], motion, edge], -1)
-    open_rows = np.arange(len(rng))
-    for _ in range(100):
-        goal, found = _shoot(rng.select(open_rows), pucks[open_rows], scene)
-        goals[open_rows[found]] = goal[found]
-        open_rows = open_rows[~found]
+    falls = roll(pucks, STEP, STEPS, half, laws)
+    goals, left = np.tile([0.39, 0.0, 0.7, 0.0], (len(rng), 1)), np.arange(len(rng))
+    for _ in range(TRIES):
+        draws = rng.select(left).uniform(LOW, HIGH, 4)
+        some = {name: value[left] for name, value in laws.items()}
+        struck, legal = _strike(falls, left, draws, scene, some)
+        rows = np.flatnonzero(legal)
+        some = {name: value[rows] for name, value in some.items()}
+        path, moment = roll(struck[rows], STEP, STEPS, half, some), np.empty_like(rows)
+        _choose(path, table.size[0] / 2 - table.puck_radius, draws[rows, 3], moment)
+        found = rows[moment >= 0]
+        goals[left[found]] = path[np.flatnonzero(moment >= 0), moment[moment >= 0], :4]
+        left = np.delete(left, found)
+        if not len(left):
+            break
     return goals
 
 
-def _shoot(rng: RandomStreams, puck: Array, scene: Scene) -> tuple[Array, Array]:
-    """Shoot once at each puck; return a random goal (W, 4), and if there is one."""
-    table, physics = scene.table, {k: p.default for k, p in PARAMETERS.items()}
-    physics.update(scene.defaults)
-    half = float(table.size[1]) / 2 - table.puck_radius
-    ways = STEP, STEPS, half, physics
-    height = rng.uniform(-0.65, -0.30)
-    angle = rng.uniform(-0.5, 0.5)
-    push = rng.uniform(0.0, 0.6)
-    choice = rng.uniform(0.0, 1.0)
-    rows = np.arange(len(rng))
+def _strike(
+    falls: Array,
+    worlds: Array,
+    draws: Array,
+    scene: Scene,
+    physics: Mapping[str, Array],
+) -> tuple[Array, Array]:
+    """Strike each puck once; return it (W, 5), and whether the shot is legal (W,).
 
-    fall = roll(puck, *ways)
-    struck = fall[rows, (fall[..., 0] <= height[:, None]).argmax(-1)]
+    Args:
+        falls: ways of all pucks, see `starts.roll`.
+        worlds: (W,) those that are struck, by index.
+        draws: (W, 4) in `LOW` .. `HIGH`.
+        scene: table.
+        physics: parameters by name, (W,) each.
+    """
+    height, angle, table = draws[:, 0], draws[:, 1], scene.table
+    below = falls[worlds, :, 0] <= height[:, None]
+    struck = falls[worlds, below.argmax(-1)]
     normal = np.stack([np.cos(angle), np.sin(angle)], -1)
     paddle = struck[:, :2] - normal * (table.paddle_radius + table.puck_radius)
-    legal = (struck[:, 0] <= height) & (np.abs(paddle[:, 1]) <= 0.24)
+    legal = below.any(-1) & (np.abs(paddle[:, 1]) <= ASIDE)
     legal &= (paddle[:, 0] >= -0.74) & (paddle[:, 0] <= -0.38)
-
+    push = physics["paddle_speed"] * draws[:, 2]
     laws = physics["paddle_restitution"], physics["paddle_friction"]
-    legal &= _hit(struck, normal, push, *laws)
-    path = roll(struck, *ways)
-    moment = np.empty(len(rows), np.int64)
-    _choose(path, table.size[0] / 2 - table.puck_radius, choice, moment)
-    return path[rows, moment, :4], legal & (moment >= 0)
+    return struck, legal & _hit(struck, normal, push, *laws)
 
 
 @njit(cache=True)
 def _hit(
-    puck: Array, normal: Array, push: Array, restitution: float, friction: float
+    puck: Array, normal: Array, push: Array, restitution: Array, friction: Array
 ) -> Array:
     """Hit pucks (W, 5), changed, by paddles that move along their normals.
 
@@ -111,7 +140,8 @@ def _hit(
         if closing <= 0.0:
             continue
         met[w], slip = True, nx * vy - ny * vx - puck[w, 4]
-        along, aside = impulse(closing, slip, restitution, friction, 1.0, 3.0)
+        laws = restitution[w], friction[w]
+        along, aside = impulse(closing, slip, *laws, 1.0, 3.0)
         puck[w, 2] += along * nx - aside * ny
         puck[w, 3] += along * ny + aside * nx
         puck[w, 4] -= 2.0 * aside

@@ -176,7 +176,11 @@ def puck_gap(state: State) -> Array:
 
 
 def roll(
-    start: Array, seconds: float, count: int, half: float, physics: Mapping[str, float]
+    start: Array,
+    seconds: float,
+    count: int,
+    half: float,
+    physics: Mapping[str, Array | float],
 ) -> Array:
     """Compute the ways of pucks that slide, fall and bank off the long walls.
 
@@ -185,7 +189,7 @@ def roll(
         seconds: time between two points of a way, s.
         count: number of points T, the start included.
         half: largest |y| of the puck's centre, m.
-        physics: parameters by name.
+        physics: parameters by name, one for all or (W,) each.
 
     Returns:
         (W, T, 5), columns as those of the start.
@@ -194,8 +198,12 @@ def roll(
         *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
         "wall_friction",
     )
-    pull = -GRAVITY * np.sin(np.radians(physics["tilt"]))
-    laws = np.array([pull, *(physics[name] for name in names)])
+    tilts = (np.radians(physics[name]) for name in ("tilt", "cross_tilt"))
+    pulls = (-GRAVITY * np.sin(tilt) for tilt in tilts)
+    columns = [*pulls, *(physics[name] for name in names)]
+    laws = np.empty((len(start), len(columns)))
+    for k, column in enumerate(columns):
+        laws[:, k] = column
     out = np.empty((len(start), count, 5))
     _roll(start, seconds, half, laws, out)
     return out
@@ -204,26 +212,26 @@ def roll(
 @njit(cache=True, error_model="numpy")
 def _roll(start: Array, h: float, half: float, laws: Array, out: Array) -> None:
     """Fill ``out`` (W, T, 5) for ``start`` (W, 5)."""
-    pull, damping, drag, restitution = laws[0], laws[1], laws[2], laws[3]
-    slope, friction = laws[4], laws[5]
     for w in range(len(out)):
+        gx, gy, damping, drag = laws[w, 0], laws[w, 1], laws[w, 2], laws[w, 3]
+        restitution, slope, friction = laws[w, 4], laws[w, 5], laws[w, 6]
         x, y, vx, vy = start[w, 0], start[w, 1], start[w, 2], start[w, 3]
         edge = start[w, 4]
         for t in range(out.shape[1]):
             way, left = out[w, t], h
             way[0], way[1], way[2], way[3], way[4] = x, y, vx, vy, edge
-            dx, dy, ex, ey = fly(vx, vy, h, pull, 0.0, damping, drag)
+            dx, dy, ex, ey = fly(vx, vy, h, gx, gy, damping, drag)
             if abs(y + dy) > half and vy * y > 0.0:
                 # As far as the wall, a bounce, and on.
                 share = max((half - abs(y)) / abs(dy), 0.0)
-                dx, dy, vx, vy = fly(vx, vy, share * h, pull, 0.0, damping, drag)
+                dx, dy, vx, vy = fly(vx, vy, share * h, gx, gy, damping, drag)
                 x, y, left = x + dx, y + dy, (1.0 - share) * h
                 # Along the normal turned by +90 degrees.
                 side = 1.0 if vy > 0.0 else -1.0
                 e = wall_restitution(abs(vy), restitution, slope)
                 push = impulse(abs(vy), side * vx - edge, e, friction, 1.0, 3.0)[1]
                 vx, vy, edge = vx + side * push, -e * vy, edge - 2.0 * push
-                dx, dy, ex, ey = fly(vx, vy, left, pull, 0.0, damping, drag)
+                dx, dy, ex, ey = fly(vx, vy, left, gx, gy, damping, drag)
             x, y, vx, vy = x + dx, y + dy, ex, ey
 
 

@@ -15,7 +15,7 @@ from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from marl_airhockey.contracts.backend import Command
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.registry import find_backend
 from marl_airhockey.transfer.recorded_play import RecordedPlay
 from marl_airhockey.types import Array

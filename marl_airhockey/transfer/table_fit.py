@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from marl_airhockey.core.physics import SLOWEST_BOUNCE
+from marl_airhockey.core.parameters import SLOWEST_BOUNCE
 from marl_airhockey.core.table import GRAVITY, Table
 from marl_airhockey.transfer.track import Contacts, Flights, Track, cut
 from marl_airhockey.types import Array

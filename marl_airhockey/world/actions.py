@@ -53,6 +53,10 @@ class Actions:
         if self._delay is not None:
             self._delay.fill(worlds, 0.0)
 
+    def asked(self, step: ControlStep) -> Array:
+        """Return the actions (B, seats, 2) of the step, before their delay."""
+        return step.action if self._delay is None else self._delay.newest
+
     def collect(
         self,
         step: ControlStep,

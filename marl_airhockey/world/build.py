@@ -58,9 +58,10 @@ def build_world(
             drivers: players of seats by agent, see `registry.make_agent`: names, paths
                 of policies, functions, models and so on; the other seats are open.
             seats: "robot" or "arcade".
-            profile: "ideal" or "robot" (delays, noise, +-15 % on every parameter).
-            observe: "velocity" (in the ideal profile), "history" (in the robot
-                profile) or "pixels".
+            profile: "ideal", or what a robot senses and how far physics may vary:
+                "ur5e", "ur5e-authors" or "gantry", see `profiles.PROFILES`.
+            observe: "velocity" (in the ideal profile), "history" (in the others) or
+                "pixels".
             goals: "flat" or "dict".
             physics: a preset's name, a TOML file, or parameters by name, values or
                 (low, high) drawn per episode, which may name a ``preset``.
@@ -98,7 +99,7 @@ def build_world(
     profile = keywords.get("profile", "ideal")
     given = keywords.get("physics")
     physics = Physics(scene.defaults, profile, given, arms=not kind.ideal)
-    usual = "history" if profile == "robot" else "velocity"
+    usual = "velocity" if profile == "ideal" else "history"
     agents = [f"paddle_{i}" for i in range(len(scene.seats))]
     drivers: dict[int, Driver] = {}
     given_drivers = keywords.get("drivers", {})

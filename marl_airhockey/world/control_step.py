@@ -10,8 +10,9 @@ from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.core.limits import INFINITE, Limited, limits_stage
 from marl_airhockey.core.rows import clear_rows
 from marl_airhockey.core.seat import ReachPlanes
+from marl_airhockey.core.servo import servo_stage
 from marl_airhockey.core.state import State
-from marl_airhockey.jit.pipeline import Pipeline
+from marl_airhockey.jit.pipeline import Pipeline, Stage
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.episode import Episode
 from marl_airhockey.world.referee import Referee, Step, Verdict
@@ -21,7 +22,12 @@ class Moment(NamedTuple):
     """State of B worlds and of their episodes, and the step that led to it."""
 
     state: State
+    ordered: Limited
+    """What the limits passed, and by how much the actions exceeded them"""
     limited: Limited
+    """What the paddles do: the same, or with a servo what follows it"""
+    rate: Array
+    """Acceleration of the servos (B, S, 2), m/s2"""
     verdict: Verdict
     episode: Episode
     """Counters, those of the verdict among them"""
@@ -36,6 +42,9 @@ class Moment(NamedTuple):
         """Begin to count anew in some worlds, by index, from paddles at rest."""
         counts = (*self.episode.running, self.limited.acceleration)
         clear_rows(worlds, tuple(x.reshape(len(x), -1) for x in counts))
+        if self.ordered is not self.limited:
+            self.ordered.velocity[worlds] = self.state.paddle_velocity[worlds]
+            self.ordered.acceleration[worlds] = self.rate[worlds] = 0.0
 
 
 class ControlStep:
@@ -53,6 +62,7 @@ class ControlStep:
         episode: of all worlds; its arrays are used.
         state: of all worlds, where they begin.
         memory: of all worlds, where they begin.
+        lags: True if paddles follow their orders as a servo does.
 
     Raises:
         ValueError: a memory whose arrays change their type or shape in a step, named.
@@ -67,9 +77,11 @@ class ControlStep:
         episode: Episode,
         state: State,
         memory: Memory,
+        lags: bool = False,
     ) -> None:
         self._backend, self._referee, self._reach = backend, referee, reach
         self._limit, self._name = limit, referee.scenario.name
+        self._lags = lags
         b, seats = len(limit), len(reach.share)
         self.action = np.zeros((b, seats, 2))
         """(B, seats, 2) actions after their delay: fractions of top speed, ego frames;
@@ -77,6 +89,8 @@ class ControlStep:
         still = Command.still(backend.scene, b)
         self.prescribed, self.closed = still.prescribed, still.closed
         self.raised = still.raised
+        self._late = np.zeros_like(self.action)
+        """(B, seats, 2) what servos make of the orders, as actions"""
         self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
         self._now = 0
         self._pipelines: list[Pipeline] = []
@@ -108,35 +122,56 @@ class ControlStep:
         here, b = self._backend.empty_state(), len(self._limit)
         here.write(np.arange(b), state)
         limited = Limited.empty(b, len(self._reach.share))
+        ordered = Limited.empty(b, len(self._reach.share)) if self._lags else limited
         step = Step(here, limited.velocity, here, memory, episode, self._limit)
         verdict = self._referee.prepare(step)
         _check_memory(memory, verdict.memory)
-        return Moment(here, limited, verdict, episode.counted(verdict.counters))
+        counted = episode.counted(verdict.counters)
+        rate = np.zeros_like(limited.velocity)
+        return Moment(here, ordered, limited, rate, verdict, counted)
 
     def _compile(self) -> None:
         first, second = self._moments
         pairs = (first, second), (second, first)
         self._pipelines = [self._pipeline(*pair) for pair in pairs]
 
-    def _pipeline(self, before: Moment, after: Moment) -> Pipeline:
+    def _limits(self, before: Moment, after: Moment) -> list[Stage]:
+        """Return the stages from actions to what the paddles are to do."""
         state, physics = before.state, before.episode.physics
-        limits = limits_stage(
-            self.action,
-            self.prescribed,
-            (state.position, state.velocity, before.limited.acceleration),
-            self._reach,
-            (physics["paddle_speed"], physics["paddle_acceleration"]),
+        top, reach = physics["paddle_speed"], self._reach
+        shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
+        moved = state.position, state.velocity, before.limited.acceleration
+        if not self._lags:
+            given = self.action, self.prescribed, moved
+            return [limits_stage(*given, *shared, after.limited)]
+        old, new = before.ordered, after.ordered
+        ordered = state.position, old.velocity, old.acceleration
+        servo = servo_stage(
+            (old.velocity, new.velocity),
+            state.velocity,
+            (before.rate, after.rate),
+            physics["servo_time"],
+            top,
+            reach,
             self._backend.control_dt,
-            after.limited,
+            self._late,
         )
-        velocity = after.limited.velocity
+        # Twice, as what lags must stay within the reach as well.
+        return [
+            limits_stage(self.action, self.prescribed, ordered, *shared, new),
+            servo,
+            limits_stage(self._late, self.prescribed, moved, *shared, after.limited),
+        ]
+
+    def _pipeline(self, before: Moment, after: Moment) -> Pipeline:
+        state, velocity = before.state, after.limited.velocity
         command = Command(velocity, self.prescribed, self.closed, self.raised)
         step = Step(
             *(state, velocity, after.state, before.verdict.memory),
             *(before.episode, self._limit),
         )
         stages = [
-            limits,
+            *self._limits(before, after),
             self._backend.stage(command, state, after.state),
             self._referee.stage(step, after.verdict),
         ]

@@ -27,6 +27,11 @@ class Delay:
         self.depth = int(np.ceil(longest / control_dt - 1e-9)) + 1
         self._past = np.zeros((shape[0], self.depth, *shape[1:]))
 
+    @property
+    def newest(self) -> Array:
+        """Values (B, ...) that were pushed last, not to be changed."""
+        return self._past[:, -1]
+
     def fill(self, rows: Rows, past: Array | float) -> None:
         """Begin anew in some worlds with the past (W, depth, ...)."""
         self._past[rows] = past

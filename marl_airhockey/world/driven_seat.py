@@ -88,8 +88,11 @@ class DrivenSeat:
             physics = {name: value[worlds] for name, value in physics.items()}
         view = self.view(sensed, memory, physics, worlds)
         kept = {name: value[worlds] for name, value in self._memory.items()}
-        action, kept = self.driver.act(view, kept)
+        answer = self.driver.act(view, kept)
         who = f"driver of paddle_{self.index} ({type(self.driver).__name__})"
+        if not (isinstance(answer, tuple) and len(answer) == 2):
+            raise ValueError(f"{who}: act() must give two things, (action, memory)")
+        action, kept = answer
         if action.shape != held.shape:
             raise ValueError(
                 f"{who}: act() must give numbers of shape {held.shape}, got "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -9,6 +10,22 @@ import numpy as np
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array
+
+
+class Selected(Mapping[str, Array]):
+    """Parameters of some worlds: those of all by name, of which rows are taken."""
+
+    def __init__(self, physics: Mapping[str, Array], worlds: Array) -> None:
+        self._physics, self._worlds = physics, worlds
+
+    def __getitem__(self, name: str) -> Array:
+        return np.asarray(self._physics[name][self._worlds])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._physics)
+
+    def __len__(self) -> int:
+        return len(self._physics)
 
 
 @dataclass(frozen=True)

@@ -69,9 +69,14 @@ class Observer:
         """Layout of the open seats' observations."""
         return self._layouts[self.observe]
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the numbers that open seats are shown; none for pictures."""
+        return () if self.observe == "pixels" else self.layout.labels
+
     def compile(self, sensed: State, memory: Memory) -> None:
         """Compile all forms of observations, unless they are, for arrays like these."""
-        history = {"history": self.sensor.history}
+        history = self.sensor.past()
         for show in self._shows.values():
             if not show.prepared:
                 show.prepare(vars(sensed), memory, history)
@@ -97,7 +102,7 @@ class Observer:
         if observe == "pixels":
             return self._pictures(memory, seats, worlds)
         self.prepare(observe)
-        history = {"history": self.sensor.history[worlds]}
+        history = self.sensor.past(worlds)
         (shown,) = self._shows[observe](vars(sensed), memory, history)
         return self.take(shown, seats)
 
@@ -135,14 +140,15 @@ class Observer:
         """
         if self.observe != "velocity" or not self.sensor.ideal:
             return {}
-        return self._flat(self.layout, state, memory, self.sensor.history)
+        return self._flat(self.layout, state, memory, self.sensor.past())
 
     def _flat(
-        self, layout: ObservationLayout, state: State, memory: Memory, history: Array
+        self, layout: ObservationLayout, state: State, memory: Memory, past: Source
     ) -> Sink:
         """Return the numbers of a layout, and the goals beside it."""
         game = self.scenario
-        shown = {"flat": layout.read(EgoView(state, memory, history, layout.scope))}
+        ego = EgoView(state, memory, past["history"], past["asked"], layout.scope)
+        shown = {"flat": layout.read(ego)}
         if game.goals == "dict" and isinstance(game, GoalScenario):
             goals = game.achieved(state, memory), game.desired(memory)
             for name, goal in zip(GOALS, goals, strict=True):
@@ -156,7 +162,7 @@ class Observer:
     def _show(
         self, layout: ObservationLayout, sensed: Source, memory: Memory, sensor: Source
     ) -> tuple[Sink]:
-        return (self._flat(layout, State(**sensed), memory, sensor["history"]),)
+        return (self._flat(layout, State(**sensed), memory, sensor),)
 
     def after_step(
         self,
@@ -205,7 +211,7 @@ class Observer:
             kept = {name: array[worlds] for name, array in memory.items()}
             fresh = self._pictures(kept, seats, worlds)
         else:
-            sources = vars(sensed), memory, {"history": self.sensor.history}
+            sources = vars(sensed), memory, self.sensor.past()
             (shown,) = self._shows[self.observe].at(worlds, *sources)
             fresh = self.take(shown, seats)
         if isinstance(observation, np.ndarray):

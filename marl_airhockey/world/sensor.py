@@ -9,52 +9,95 @@ from dataclasses import replace
 
 import numpy as np
 
-from marl_airhockey.contracts.observable import FRAMES, HISTORY
+from marl_airhockey.contracts.observable import FRAMES, HISTORY, PENDING
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.rng import RandomStreams, StreamSet
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
+from marl_airhockey.world.calibration import CalibrationMap
 from marl_airhockey.world.delay import ALL, Delay, Rows
+from marl_airhockey.world.occlusion import Occlusion
 
-OCCLUSION_SECONDS = 0.1
-"""s: mean length of an occlusion."""
+SENSED = (
+    *("observation_delay", "observation_jitter", "position_noise"),
+    *("calibration_error", "occlusion", "false_detection"),
+)
+"""Names of the physical parameters of sensing."""
+SAME_FRAME = 1e-4
+"""Frames that are no more than this apart are one (s)."""
 
 
 class Sensor:
     """Sensor of B worlds, which turns states into sensed states.
 
+    At every step it looks at the newest frame of the camera, as old as the delay of the
+    episode and a jitter of the step. What it sees lies off by a smooth map, fixed for
+    the episode, and by white noise. A puck near an arm may be hidden: it stays where it
+    was seen last, at the velocity that it had. Rarely a puck is seen where it is not.
+    A velocity is the way between the last two frames in which a body was seen, over the
+    time between them.
+
     Args:
         scene: who is on the table.
         num_worlds: B.
-        physics: says how much delay, noise and occlusion there can be.
+        physics: says how much of all this there can be.
         control_dt: s.
     """
 
     def __init__(
         self, scene: Scene, num_worlds: int, physics: Physics, control_dt: float
     ) -> None:
-        names = ("observation_delay", "position_noise", "occlusion")
-        self.ideal = not any(physics.highest(name) for name in names)
+        self.ideal = not physics.any_of(*SENSED)
         self.control_dt = control_dt
         self.camera = slice(scene.bodies.paddles, scene.bodies.movers)
         """Bodies that the camera sees."""
         self.pucks = scene.bodies.pucks
-        things = (num_worlds, self.camera.stop - self.camera.start, 2)
-        self.delay = Delay(physics.highest("observation_delay"), control_dt, things)
+        count = self.camera.stop - self.camera.start
+        things = (num_worlds, count, 2)
+        longest = physics.highest("observation_delay")
+        longest += physics.highest("observation_jitter")
+        self.delay = Delay(longest, control_dt, things)
+        self._extent = np.abs(np.asarray(scene.table.vertices)).max(0)
+        self._map = CalibrationMap(num_worlds, 2 * self._extent[1])
+        self._maps = physics.any_of("calibration_error")
+        self._occlusion = Occlusion(scene, num_worlds, control_dt)
+        self._hides = physics.any_of("occlusion")
+        self._errs = physics.any_of("false_detection")
         self._position, self._speed = np.zeros(things), np.zeros(things)
+        self._taken = np.zeros((num_worlds, count))
+        """Time at which the frame was taken in which a body was seen last, s"""
         self._visible = np.ones((num_worlds, self.pucks), np.bool_)
-        self.history = np.zeros((num_worlds, HISTORY, self.pucks, 3))
-        """(B, HISTORY, pucks, 3) sensed x, y and visibility, newest last."""
+        self.history = np.zeros((num_worlds, HISTORY, self.pucks, 4))
+        """(B, HISTORY, pucks, 4) sensed x, y, visibility and age (s), newest last."""
         self.frames = np.zeros((num_worlds, FRAMES, len(scene.bodies), 2))
         """(B, FRAMES, N, 2) sensed positions of all bodies, newest last."""
+        self.asked = np.zeros((num_worlds, PENDING, scene.bodies.paddles, 2))
+        """(B, PENDING, seats, 2) last actions asked for, in ego frames, newest last."""
         self.keeps_history = False
-        """True if `history` and `frames` are kept, as an observation needs them."""
+        """True if these three are kept, as an observation needs them."""
+
+    def past(self, rows: Rows = ALL) -> dict[str, Array]:
+        """Return ``history`` and ``asked`` of some worlds, by name."""
+        return {"history": self.history[rows], "asked": self.asked[rows]}
+
+    def note(self, actions: Array) -> None:
+        """Take note of the actions (B, seats, 2) that are asked for in a step."""
+        self.asked[:, :-1], self.asked[:, -1] = self.asked[:, 1:], actions
+
+    def begin(
+        self, worlds: Array, values: dict[str, Array], streams: StreamSet
+    ) -> None:
+        """Draw what holds for an episode in some worlds; `reset` comes after it."""
+        self.asked[worlds] = 0.0
+        if self._maps:
+            sd = values["calibration_error"][worlds]
+            self._map.draw(streams.of("sensor", worlds), sd, worlds)
 
     def reset(
         self, worlds: Array, state: State, values: dict[str, Array], streams: StreamSet
     ) -> State:
-        """Begin an episode in some worlds and return its first sensed state.
+        """Forget what was seen in some worlds; return the sensed state.
 
         The past is that of bodies that have moved at their velocities.
 
@@ -69,9 +112,13 @@ class Sensor:
             velocity = state.velocity[worlds, self.camera]
             ago = np.arange(self.delay.depth, 0, -1)[:, None, None] * self.control_dt
             self.delay.fill(worlds, position[:, None] - velocity[:, None] * ago)
-            late = values["observation_delay"][worlds] + self.control_dt
-            self._position[worlds] = position - velocity * late[:, None, None]
+            age = values["observation_delay"][worlds] + self.control_dt
+            place = position - velocity * age[:, None, None]
+            self._position[worlds] = self._map.shifted(place, worlds)
+            self._speed[worlds] = velocity
+            self._taken[worlds] = (state.time[worlds] - age)[:, None]
             self._visible[worlds] = True
+            self._occlusion.reset(worlds)
         sensed = self.sense(state, values, streams, worlds)
         if self.keeps_history:
             self.history[worlds] = self.history[worlds][:, -1:]
@@ -88,7 +135,7 @@ class Sensor:
         """Return the sensed state; time has passed in the worlds ``rows`` alone."""
         if self.ideal and not self.keeps_history:
             return state
-        sensed = state
+        sensed, age = state, np.zeros((len(state.time), self.pucks))
         if not self.ideal:
             rng = streams.of("sensor").select(rows)
             self._look(state, values, rng, rows)
@@ -105,8 +152,10 @@ class Sensor:
                 spin=spin,
                 visible=state.visible & self._visible,
             )
+            age = state.time[:, None] - self._taken[:, : self.pucks]
         if self.keeps_history:
-            newest = np.concatenate([sensed.puck, sensed.visible[..., None]], -1)
+            seen = np.stack([sensed.visible, age], -1)
+            newest = np.concatenate([sensed.puck, seen], -1)
             for kept, new in ((self.history, newest), (self.frames, sensed.position)):
                 past = kept[rows]
                 kept[rows] = np.concatenate([past[:, 1:], new[rows][:, None]], 1)
@@ -116,21 +165,31 @@ class Sensor:
         self, state: State, values: dict[str, Array], rng: RandomStreams, rows: Rows
     ) -> None:
         """Update the sensed positions and speeds of the bodies in some worlds."""
-        true = state.position[rows, self.camera]
-        position = self.delay.push(true, values["observation_delay"][rows], rows)
+        age = values["observation_delay"][rows]
+        age = age + values["observation_jitter"][rows] * rng.uniform(0.0, 1.0)
+        place = self.delay.push(state.position[rows, self.camera], age, rows)
+        seen = self._map.shifted(place, rows) if self._maps else place.copy()
         noise = values["position_noise"][rows][:, None, None]
-        position += noise * rng.normal(*position.shape[1:])
-        last = self._position[rows]
-        visible = self._unhidden(values["occlusion"][rows], rng, rows)
-        held = ~visible[..., None]
-        np.copyto(position[:, : self.pucks], last[:, : self.pucks], where=held)
-        self._speed[rows] = (position - last) / self.control_dt
-        self._position[rows] = position
-        self._visible[rows] = visible
-
-    def _unhidden(self, share: Array, rng: RandomStreams, rows: Rows) -> Array:
-        """Draw occlusions as a two-state Markov chain with the wanted share of time."""
-        end = min(self.control_dt / OCCLUSION_SECONDS, 1.0)
-        begin = (end * share / (1 - share))[:, None]
-        luck = rng.uniform(0.0, 1.0, self.pucks)
-        return np.where(self._visible[rows], luck >= begin, luck < end)
+        seen += noise * rng.normal(*seen.shape[1:])
+        visible = np.ones((len(seen), seen.shape[1]), np.bool_)
+        pucks = visible[:, : self.pucks]
+        if self._hides:
+            arms, share = state.paddle[rows], values["occlusion"][rows]
+            pucks[:] = self._occlusion.unhidden(
+                place[:, : self.pucks], arms, share, rng, rows
+            )
+        if self._errs:
+            wrong = rng.uniform(0.0, 1.0, self.pucks)
+            wrong = wrong < values["false_detection"][rows][:, None]
+            elsewhere = self._extent * rng.uniform(-1.0, 1.0, self.pucks, 2)
+            np.copyto(seen[:, : self.pucks], elsewhere, where=wrong[..., None])
+            pucks |= wrong
+        taken = (state.time[rows] - age)[:, None]
+        since = taken - self._taken[rows]
+        fresh = visible & (since > SAME_FRAME)
+        last, speed = self._position[rows], self._speed[rows]
+        moved = (seen - last) / np.maximum(since, SAME_FRAME)[..., None]
+        self._speed[rows] = np.where(fresh[..., None], moved, speed)
+        self._position[rows] = np.where(fresh[..., None], seen, last)
+        self._taken[rows] = np.where(fresh, taken, self._taken[rows])
+        self._visible[rows] = pucks

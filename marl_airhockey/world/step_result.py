@@ -47,7 +47,7 @@ class StepResult:
             open_seats: (open,) indices of the open seats; None for all.
         """
         outcome, terms = moment.verdict.outcome, moment.verdict.terms
-        violation, success = moment.limited.violation.copy(), moment.episode.success
+        violation, success = moment.ordered.violation.copy(), moment.episode.success
         reward, applied = outcome["reward"], outcome["applied_action"]
         rows = (reward, applied, violation[..., -1], success, *terms.values())
         if open_seats is None:

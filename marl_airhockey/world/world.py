@@ -9,17 +9,19 @@ import numpy as np
 from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.parameters import SCATTER
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.rng import StreamSet
+from marl_airhockey.core.rng import RandomStreams, StreamSet
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
-from marl_airhockey.world.episode import Episode
+from marl_airhockey.world.episode import Episode, Selected
 from marl_airhockey.world.observer import Observation, Observer, duplicate
 from marl_airhockey.world.referee import Referee
+from marl_airhockey.world.sensed_goals import judge_sensed
 from marl_airhockey.world.sensor import Sensor
 from marl_airhockey.world.set_state import checked_memory, settled
 from marl_airhockey.world.step_result import StepResult
@@ -69,7 +71,9 @@ class World:
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
         self._seeded, self.seeds = False, np.zeros(b, np.int64)
         """(B,) seed of each world"""
-        self._streams = StreamSet(b, "start", "physics", "sensor", "serve")
+        self._scatters = physics.any_of(*SCATTER)
+        purposes = ("start", "physics", "sensor", "serve", "contact")
+        self._streams = StreamSet(b, *purposes[: 5 if self._scatters else 4])
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._state
@@ -106,6 +110,12 @@ class World:
     def command(self) -> Array:
         """(B, seats, 2) command of the last step, table frame, m/s; a copy."""
         return self._built.now.limited.velocity.copy()
+
+    @property
+    def terms(self) -> dict[str, Array]:
+        """Reward terms of the last step by name, (B, seats) each; copies."""
+        terms = self._built.now.verdict.terms
+        return {name: term.copy() for name, term in terms.items()}
 
     @property
     def max_cycles(self) -> int:
@@ -175,8 +185,10 @@ class World:
         changed = self._episode.draw_physics(self.physics, stream, worlds)
         if len(changed):
             self.backend.set_physics(self._episode.physics, changed)
+        self._key_scatter(worlds)
         rng = self._streams.of("start", worlds)
-        self._begin(worlds, *self.scenario.reset(rng, len(worlds)))
+        state, memory = self.scenario.reset(rng, len(worlds))
+        self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
         for seat in self.driven:
             seat.reset(worlds, self.seeds, number)
 
@@ -205,11 +217,25 @@ class World:
         if memory is None:
             rng = self._streams.of("start", worlds)
             memory = self.scenario.initial_memory(rows, rng)
+            memory = self._aimed(rng, rows, memory, worlds)
+        self._key_scatter(worlds)
         self._begin(worlds, rows, checked_memory(memory, self._memory, len(worlds)))
         self._episode.cycles[worlds] = np.round(rows.time / self.control_dt)
         for seat in self.driven:
             seat.begin(worlds)
         return self.observation()
+
+    def _aimed(
+        self, rng: RandomStreams, rows: State, memory: Memory, worlds: Array
+    ) -> Memory:
+        """Return the memory of episodes that begin, with what their physics decides."""
+        physics = Selected(self._episode.physics, worlds)
+        return self.scenario.aim(rng, rows, memory, physics)
+
+    def _key_scatter(self, worlds: Array) -> None:
+        """Let equal states of an episode have the same future, scatter and all."""
+        if self._scatters:
+            self.backend.key_scatter(self._streams.keys("contact"), worlds)
 
     def get_state(self) -> tuple[State, Memory]:
         """Return the true state and the memory, which `set_state` takes."""
@@ -219,11 +245,13 @@ class World:
         """Begin an episode in some worlds, by index, from rows of state and memory."""
         if self._step is None:
             parts = self.backend, self.referee, self.reach, self._limit
-            self._step = ControlStep(*parts, self._episode, rows, memory)
+            lags = self.backend.ideal and self.physics.any_of("servo_time")
+            self._step = ControlStep(*parts, self._episode, rows, memory, lags)
             self._adopt(self._step.now)
         self._place(worlds, rows, memory)
         self._step.now.begin(worlds)
         self._actions.reset(worlds)
+        self.sensor.begin(worlds, self._episode.physics, self._streams)
         self._sense(worlds)
         self.observer.compile(self._sensed, self._memory)
 
@@ -258,6 +286,8 @@ class World:
         """
         now = self._sensed, self._memory, self._episode
         self._actions.collect(self._built, actions, *now)
+        if self.sensor.keeps_history:
+            self.sensor.note(self._actions.asked(self._built))
         moment = self._built()
         self._adopt(moment)
         result = StepResult.of(moment, self.open if self.driven else None)
@@ -273,6 +303,8 @@ class World:
     def _finish_step(self, moment: Moment, result: StepResult) -> None:
         """Sense, serve inside episodes, observe, and reset the worlds that ended."""
         self._sense()
+        if self.scenario.goals == "dict" and not self.sensor.ideal:
+            judge_sensed(self.scenario, self._sensed, moment, self._limit, result)
         served, serves = None, moment.verdict.outcome.get("serves")
         # count_nonzero: for few worlds, `any` costs as much as the physics.
         if serves is not None and np.count_nonzero(serves):

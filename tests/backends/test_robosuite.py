@@ -7,10 +7,10 @@ from pages import aim, line
 
 import marl_airhockey as ah
 from marl_airhockey.core.geometry import half_planes
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import GRAVITY
+from marl_airhockey.core.table import GRAVITY, TABLES
 from marl_airhockey.jit.threads import use_threads
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.session import Session
@@ -157,11 +157,16 @@ def test_nothing_escapes():
             assert y < 0.3048
 
 
+@pytest.mark.parametrize("table", ["standard", "full_size"])
 @pytest.mark.parametrize("tilt", [0.0, 5.5])
-def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
+def test_the_robot_seat_is_what_an_arm_can_hold(tilt, table):
+    """Seen from its side, an arm stands at any table as it does at the standard one."""
     from marl_airhockey.backends.robosuite.inverse_kinematics import find_joint_angles
 
     seats = (HOME, make_seat("robot", TABLE, 2))
+    shift = float(TABLES[table].offsets[0] - TABLE.offsets[0])
+    polygon = np.array(make_seat("robot", TABLES[table], 0).reach)
+    polygon[:, 0] += shift
     env = AirHockey(scene=Scene(TABLE, seats, physics={"tilt": tilt}))
     env.reset()
     model, data = env.sim.model._model, env.sim.data._data
@@ -170,8 +175,8 @@ def test_the_robot_seat_is_what_an_arm_can_hold(tilt):
         site = robot.eef_site_id["right"]
         joints, dofs = robot._ref_joint_pos_indexes, robot._ref_joint_vel_indexes
         angles, jacobian = np.array(robot.init_qpos), np.zeros((6, model.nv))
-        normals, offsets = half_planes(seat.reach)
-        corners = np.array(seat.reach)
+        normals, offsets = half_planes(polygon)
+        corners = polygon
         for x, y in np.ndindex(9, 9):
             share = np.array([x, y]) / 8
             ego = corners.min(0) + share * np.ptp(corners, axis=0)
@@ -303,7 +308,7 @@ def test_arms_differ_from_world_to_world():
         pushed[name] = trace[..., FORCE].mean()
     assert pushed["arm_force"] == pytest.approx(20.0, rel=0.1)
     assert pushed["arm_payload"] - pushed["tilt"] == pytest.approx(GRAVITY, rel=0.1)
-    arms = ah.make_world("juggle", 4, backend="robosuite", profile="robot")
+    arms = ah.make_world("juggle", 4, backend="robosuite", profile="ur5e")
     arms.reset(0)
     stiff = [world.views.gains[0, 0] for world in arms.backend.worlds]
     np.testing.assert_allclose(stiff, arms.episode.physics["arm_stiffness"])

@@ -5,7 +5,8 @@ import pytest
 from bench import DT, Bench
 
 from marl_airhockey.core.laws import cap, fly, slide, wall_restitution
-from marl_airhockey.core.physics import PRESETS, PUCK_SPEED_CAP, Physics, load_physics
+from marl_airhockey.core.parameters import PRESETS, PUCK_SPEED_CAP
+from marl_airhockey.core.physics import Physics, load_physics
 from marl_airhockey.core.table import GRAVITY, Table
 
 RADIUS = 0.03175

@@ -1,8 +1,20 @@
-"""Physics that a world draws from."""
+"""Physics that a world draws from, and the profiles."""
 
 import numpy as np
+import pytest
 
 import marl_airhockey as ah
+from marl_airhockey.core.parameters import PARAMETERS, PRESETS
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.profiles import PROFILES, delay_of
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.table import GRAVITY
+
+
+def drawn(worlds=4000, base=None, **keywords):
+    """Return physics and many draws of it."""
+    physics, rows = Physics(base or {}, **keywords), np.arange(worlds)
+    return physics, physics.draw(RandomStreams.keyed(rows, rows, "physics"))
 
 
 def test_physics_ranges_are_drawn_anew_for_every_episode():
@@ -18,3 +30,68 @@ def test_physics_ranges_are_drawn_anew_for_every_episode():
     assert not np.array_equal(first, world.episode.physics["puck_damping"])
     world.reset(0)
     np.testing.assert_array_equal(first, world.episode.physics["puck_damping"])
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_profile_names_parameters_within_their_bounds(name):
+    profile = PROFILES[name]
+    for key, pair in profile.ranges.items():
+        assert PARAMETERS[key].low <= pair[0] <= pair[1] <= PARAMETERS[key].high
+    for key in (*profile.shares, *profile.follows):
+        assert key in PARAMETERS
+    assert not set(profile.ranges) & (set(profile.shares) | set(profile.follows))
+    physics, values = drawn(profile=name)
+    for key, value in values.items():
+        if key not in ("tilt", "cross_tilt"):
+            low, high = physics.ranges[key]
+            assert low - 1e-12 <= value.min() <= value.max() <= high + 1e-12
+
+
+def test_profiles_do_not_change_seats():
+    for name in PROFILES:
+        for seats, top in (("robot", (0.7, 7.0)), ("arcade", (5.0, 50.0))):
+            world = ah.make_world("reach", profile=name, seats=seats)
+            ranges = world.physics.ranges
+            assert ranges["paddle_speed"] == (top[0], top[0])
+            assert ranges["paddle_acceleration"] == (top[1], top[1])
+
+
+def test_the_delays_of_the_profiles_are_those_that_were_measured():
+    low, high = delay_of(PROFILES["ur5e"])
+    assert 0.075 < low < 0.085
+    assert 0.165 < high < 0.175
+    assert delay_of(PROFILES["ur5e-authors"]) == pytest.approx((0.25, 0.35), abs=0.01)
+    # Round trip of the gantry: 13.1 .. 22.0 ms, to which its loop adds up to 3.
+    assert delay_of(PROFILES["gantry"]) == pytest.approx((0.0134, 0.0247), abs=1e-3)
+    assert delay_of(PROFILES["ideal"]) == (0.0, 0.0)
+
+
+def test_lively_rails_lose_little_with_speed():
+    _, values = drawn(profile="ur5e")
+    e, slope = values["wall_restitution"], values["wall_restitution_slope"]
+    line = 0.08 - 0.07 * (e - 0.65) / 0.23
+    assert np.abs(slope - line).max() <= 0.01
+    assert np.ptp(slope - line) > 0.019
+    both = {"preset": "wooden"}, {"wall_restitution_slope": 0.02}
+    for given, wanted in zip(both, (0.07, 0.02), strict=True):
+        _, values = drawn(profile="ur5e", given=given)
+        assert (values["wall_restitution_slope"] == wanted).all()
+
+
+def test_tables_slope_a_little_in_any_direction():
+    _, values = drawn(profile="gantry", base={"tilt": 0.0})
+    pulls = GRAVITY * np.sin(np.radians([values["tilt"], values["cross_tilt"]]))
+    np.testing.assert_allclose(pulls.std(1), 0.04, rtol=0.05)
+    np.testing.assert_allclose(pulls.mean(1), 0.0, atol=0.003)
+    _, values = drawn(profile="ur5e", given={"slope": 0.0})
+    pull = GRAVITY * np.sin(np.radians(values["tilt"]))
+    assert 0.685 < pull.min() < 0.70
+    assert 0.95 < pull.max() < 0.965
+
+
+def test_what_the_user_says_overrides_the_profile():
+    physics, _ = drawn(profile="ur5e", given={"preset": "wooden", "tilt": 3.0})
+    for name, value in PRESETS["wooden"].items():
+        assert physics.ranges[name] == (value, value)
+    assert physics.ranges["tilt"] == (3.0, 3.0)
+    assert physics.ranges["servo_time"] == (0.05, 0.10)

@@ -8,7 +8,9 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES, Table
@@ -249,3 +251,25 @@ def test_a_wrong_shape_of_a_scenario_is_named(function, result, words):
     env = ah.parallel_env(kind())
     with pytest.raises(ValueError, match=words):
         env.reset(seed=0)
+
+
+def test_what_an_author_forgot_is_named():
+    with pytest.raises(ValueError, match=r"NoRules lacks .*reward_terms"):
+        ah.parallel_env(type("NoRules", (Scenario,), {"scene": Pair.scene}))
+
+    class Nan(Pair):
+        def reward_terms(self, t):
+            return {"goal": np.full((*t.after.time.shape, 2), np.nan)}
+
+    drivers = {"paddle_1": "still"}
+    with pytest.raises(ValueError, match=r"terms \['goal'\] are nan"):
+        ah.evaluate("still", Nan(), episodes=2, drivers=drivers)
+    with pytest.raises(ValueError, match=r"must give two things, \(action, memory\)"):
+        ah.evaluate(Alone(), Pair(), episodes=2, drivers=drivers)
+
+
+class Alone(Driver):
+    """Driver that forgets its memory."""
+
+    def act(self, view, memory):
+        return np.zeros((len(view.reach), 2))

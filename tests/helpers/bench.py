@@ -3,7 +3,7 @@
 import numpy as np
 
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PARAMETERS, PRESETS
+from marl_airhockey.core.parameters import PARAMETERS, PRESETS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES

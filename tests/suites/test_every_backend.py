@@ -10,7 +10,7 @@ from pair import Pair
 
 import marl_airhockey as ah
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
+from marl_airhockey.core.parameters import PARAMETERS, PUCK_SPEED_CAP
 from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import GRAVITY, Table

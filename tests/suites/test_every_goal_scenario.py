@@ -10,6 +10,9 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 import marl_airhockey as ah
 from marl_airhockey.registry import gymnasium_id, make_scenario
 
+PROFILES = ("ideal", "ur5e", "gantry")
+GOAL_NAMES = ("achieved_goal", "desired_goal")
+
 
 def test_every_goal_scenario_is_known_to_this_test(goal_scenario):
     assert make_scenario(goal_scenario, goals="dict").goals == "dict"
@@ -30,11 +33,19 @@ def test_it_passes_the_checks_of_goal_environments(goal_scenario):
     check_env_sb3(env.unwrapped)
 
 
-def test_reward_success_and_compute_reward_agree(goal_scenario):
+@pytest.mark.parametrize("profile", PROFILES)
+def test_reward_success_and_compute_reward_agree(goal_scenario, profile):
+    """Reward and end follow what is shown, success the truth."""
     worlds = 24
     driver = "reacher" if goal_scenario.startswith("reach") else "striker"
-    drivers = {"paddle_0": driver}
-    world = ah.make_world(goal_scenario, worlds, goals="dict", drivers=drivers)
+    world = ah.make_world(
+        goal_scenario,
+        worlds,
+        goals="dict",
+        drivers={"paddle_0": driver},
+        profile=profile,
+        observe="velocity",
+    )
     world.autoreset = False
     world.reset(0)
     game = world.scenario
@@ -42,21 +53,45 @@ def test_reward_success_and_compute_reward_agree(goal_scenario):
     goal_met = np.zeros(worlds, bool)
     for _ in range(world.max_cycles):
         step = world.step(np.zeros((worlds, 0, 2)))
-        achieved.append(game.achieved(world.state, world.memory))
-        wanted = game.desired(world.memory)
-        rewards.append(game.goal_reward(achieved[-1], wanted))
-        goal_met |= rewards[-1] > 0
+        wanted = game.desired(world.memory).astype(np.float32)
+        shown = game.achieved(world.sensed, world.memory).astype(np.float32)
+        achieved.append(shown)
+        rewards.append(game.shown_reward(shown, wanted))
+        true = game.achieved(world.state, world.memory).astype(np.float32)
+        goal_met |= game.shown_reward(true, wanted) > 0
         np.testing.assert_array_equal(world.episode.success[:, 0], goal_met)
         # Only a met goal ends it: a dropped puck does not.
         np.testing.assert_array_equal(step.terminated, rewards[-1] > 0)
     np.testing.assert_allclose(world.episode.returns[:, 0], np.sum(rewards, axis=0))
-    assert goal_met.any()
+    assert goal_met.any() or profile != "ideal"
     # Relabelled: what was achieved at any moment is a goal that it met there.
     late = np.array(achieved)
     counts = np.ones(late.shape[:2], bool)
     if goal_scenario.startswith("hit"):
         counts = late[..., -1] > 0.5
-    np.testing.assert_array_equal(game.goal_reward(late, late) > 0, counts)
+    np.testing.assert_array_equal(game.shown_reward(late, late) > 0, counts)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_rewards_are_those_of_the_observations(goal_scenario, profile):
+    """Of 10^4 steps of an environment, with paddles that go for goal or puck."""
+    env = ah.make_sb3_vec(goal_scenario, 50, goals="dict", profile=profile)
+    env.seed(1)
+    shown, rng, met = env.reset(), np.random.default_rng(0), 0
+    target = "desired_goal" if goal_scenario.startswith("reach") else "achieved_goal"
+    for k in range(200):
+        way = 8 * (shown[target][:, :2] - shown["observation"][:, :2])
+        luck = rng.uniform(-1, 1, (50, 2))
+        actions = np.clip(way if k % 3 else luck, -1, 1).astype(np.float32)
+        shown, rewards, done, infos = env.step(actions)
+        last = [
+            info["terminal_observation"] if d else {k: v[i] for k, v in shown.items()}
+            for i, (info, d) in enumerate(zip(infos, done, strict=True))
+        ]
+        goals = (np.array([o[n] for o in last]) for n in GOAL_NAMES)
+        np.testing.assert_array_equal(env.compute_reward(*goals, {}), rewards)
+        met += int(rewards.sum())
+    assert met > 0
 
 
 def test_compute_reward_is_vectorised(goal_scenario):

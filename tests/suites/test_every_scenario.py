@@ -130,7 +130,7 @@ def test_a_row_of_many_worlds_equals_a_single_world(scenario, backend):
             np.testing.assert_array_equal(a[row], b[0])
 
 
-@pytest.mark.parametrize("profile", ["ideal", "robot"])
+@pytest.mark.parametrize("profile", ["ideal", "ur5e"])
 def test_observations_lie_in_their_space_and_none_is_constant(
     scenario, backend, profile
 ):

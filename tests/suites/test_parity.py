@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES, Table

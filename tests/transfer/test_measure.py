@@ -53,7 +53,7 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
     )
     with pytest.raises(ValueError, match="another size"):
         train(wrong, tmp_path / "wrong")
-    with pytest.raises(ValueError, match="sb3 can begin"):
+    with pytest.raises(ValueError, match="rllib cannot begin"):
         preset("reach", {**SMALL, "init": "x", "engine": "rllib"})
     lost = preset("reach", {**SMALL, "init": str(tmp_path / "nowhere")})
     with pytest.raises(ValueError, match="no folder of a run"):
@@ -79,6 +79,7 @@ def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):
         folder.mkdir(exist_ok=True)
         if config is not None:
             (folder / "config.toml").write_text(config.to_toml())
+            (folder / "last.zip").touch()
         raise RuntimeError("cut off")
 
     monkeypatch.setattr("marl_airhockey.cli.transfer.train_with_progress", train)

@@ -6,7 +6,8 @@ from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
 from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import PARAMETERS, Physics, load_physics
+from marl_airhockey.core.parameters import PARAMETERS
+from marl_airhockey.core.physics import Physics, load_physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES

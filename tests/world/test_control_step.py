@@ -7,7 +7,7 @@ import marl_airhockey as ah
 
 GAMES = [
     ("juggle", {}),
-    ("juggle", {"profile": "robot"}),
+    ("juggle", {"profile": "ur5e"}),
     ("hit_goal", {"goals": "dict"}),
     ("move_block", {"physics": {"tilt": (3.0, 8.0)}}),
     ("duel", {}),

@@ -14,7 +14,7 @@ import marl_airhockey as ah
 MOMENTS = (0, 1, 60)
 GAMES = [
     ("juggle", {}),
-    ("juggle", {"profile": "robot"}),
+    ("juggle", {"profile": "ur5e"}),
     ("juggle", {"observe": "pixels"}),
     ("hit_goal", {"goals": "dict"}),
     ("strike_crowd", {}),

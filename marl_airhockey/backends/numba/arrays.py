@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.core.parameters import SCATTER
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import reaches
 from marl_airhockey.core.table import GRAVITY
@@ -15,12 +16,14 @@ PULL_X, PULL_Y, DAMPING, DRAG = range(4)
 WALL_E, WALL_SLOPE, WALL_MU, PADDLE_E, PADDLE_MU = range(4, 9)
 PUCK_E, PUCK_MU, BLOCK_E = range(9, 12)
 PUCK_MASS, BLOCK_MASS, BLOCK_GRIP, PULL, STEP_TIME = range(12, 17)
-COEFFICIENTS = 17
+WALL_E_SD, WALL_EXIT_SD, PADDLE_E_SD, SPIN_SD = range(17, 21)
+COEFFICIENTS = 21
 """Columns of a world's coefficients: acceleration by the slope (m/s2), linear (1/s) and
 quadratic drag (1/m); restitution at walls, its loss per ln(m/s), and friction there;
 restitutions and frictions of paddles and pucks, restitution of blocks; masses (kg),
 deceleration of sliding blocks, the size of the slope's acceleration (m/s2), and the
-time without linear drag for the way that a puck goes in a control step with it (s)."""
+time without linear drag for the way that a puck goes in a control step with it (s);
+and the scatter of `core.scatter`."""
 
 
 def make_coefficients(values: dict[str, Array], control_dt: float) -> Array:
@@ -38,6 +41,7 @@ def make_coefficients(values: dict[str, Array], control_dt: float) -> Array:
     time = np.where(damping > 0.0, time, control_dt)
     columns = [pull_x, pull_y, *(values[n] for n in names)]
     columns += [np.hypot(pull_x, pull_y), time]
+    columns += [values[name] for name in SCATTER]
     return np.stack(columns, axis=-1)
 
 
@@ -159,3 +163,7 @@ class Batch(NamedTuple):
     commands: Commands
     previous: Previous
     result: Result
+    keys: Array
+    """Keys of the worlds' scatter (B,)"""
+    collisions: Array
+    """Number of collisions since they were set (B,)"""

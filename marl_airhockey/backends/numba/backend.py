@@ -14,7 +14,7 @@ from marl_airhockey.backends.numba.arrays import (
 from marl_airhockey.backends.numba.geometry import begin_pucks
 from marl_airhockey.backends.numba.kernel import advance, work_space
 from marl_airhockey.contracts.backend import Backend, Command
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.jit.pipeline import Fixed, Stage
@@ -52,6 +52,7 @@ class NumbaBackend(Backend):
         self._against = np.zeros((*pucks, len(scene.table.vertices)), np.bool_)
         self._out = np.zeros(pucks, np.bool_)
         self._pinned = np.zeros(pucks)
+        self._keys, self._collisions = np.zeros(b, np.uint64), np.zeros(b, np.int64)
         self._work = work_space(self._static, b)
         self._pathless = np.zeros((b, 0, bodies.movers, 4))
 
@@ -74,6 +75,9 @@ class NumbaBackend(Backend):
         rows = {name: value[worlds] for name, value in values.items()}
         self._coefficients[worlds] = make_coefficients(rows, self.control_dt)
 
+    def key_scatter(self, keys: Array, worlds: Array) -> None:
+        self._keys[worlds], self._collisions[worlds] = keys[worlds], 0
+
     def reset(self, state: State, worlds: Array) -> None:
         super().reset(state, worlds)
         static, radius = self._static, self.scene.table.puck_radius
@@ -91,7 +95,8 @@ class NumbaBackend(Backend):
             *(getattr(before, name) for name in given),
             *(getattr(after, name) for name in RESULTS),
             self._pathless if after.path is None else after.path,
-            *(self._against, self._out, self._pinned, *self._work),
+            *(self._against, self._out, self._pinned),
+            *(self._keys, self._collisions, *self._work),
         )
         return Stage(advance, arguments)
 

@@ -13,11 +13,15 @@ from marl_airhockey.backends.numba.arrays import (
     BLOCK_MASS,
     HALF,
     PADDLE_E,
+    PADDLE_E_SD,
     PADDLE_MU,
     PUCK_E,
     PUCK_MASS,
     PUCK_MU,
+    SPIN_SD,
     WALL_E,
+    WALL_E_SD,
+    WALL_EXIT_SD,
     WALL_MU,
     WALL_SLOPE,
     Batch,
@@ -58,7 +62,9 @@ from marl_airhockey.backends.numba.geometry import (
     stays_in_reach,
 )
 from marl_airhockey.backends.numba.impacts import (
+    CONTACT,
     FRICTION,
+    KICK,
     NX,
     NY,
     RESTITUTION,
@@ -69,6 +75,7 @@ from marl_airhockey.backends.numba.near import list_near, longest_drift
 from marl_airhockey.backends.numba.overlaps import keep_in_reach, take_apart
 from marl_airhockey.contracts.backend import PATIENCE
 from marl_airhockey.core.laws import cap, wall_restitution
+from marl_airhockey.core.scatter import at_paddle, at_wall, draw
 from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
 
@@ -80,7 +87,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
     Each inner function is one phase; numba inlines them, which saves the reference
     counts of a dozen arrays at every call.
     """
-    static, coefficients, commands, previous, result = batch
+    static, coefficients, commands, previous, result, keys, collisions = batch
     paddles, pucks, blocks, radius, shared, wall_side = static[:6]
     goal_lines, edges, obstacles, control_dt = static[6:]
     held = paddles * edges
@@ -98,8 +105,8 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
     at += 8 * movers * BODY
     kept = view(at, (movers, 3), np.float64)
     at += 8 * movers * 3
-    contacts = view(at, (size, 4), np.float64)
-    at += 8 * size * 4
+    contacts = view(at, (size, CONTACT), np.float64)
+    at += 8 * size * CONTACT
     walls = view(at, (len(shared), 7), np.float64)
     walls[:] = shared
     at = indices.ctypes.data
@@ -219,7 +226,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
 
     def touch(b: int, n: int, i: int, j: int, nx: float, ny: float) -> float:
         # Note a contact with its laws and return its closing speed.
-        row = coefficients[b]
+        row, kick = coefficients[b], 0.0
         speed = closing(m, VX, i, j, nx, ny)
         restitution, friction = row[PUCK_E], row[PUCK_MU]
         if role[j] == BLOCK:
@@ -227,14 +234,24 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             friction = friction if i >= 0 and role[i] == PUCK else 0.0
         if 0 <= i < paddles and role[j] == PUCK:
             restitution, friction = row[PADDLE_E], row[PADDLE_MU]
+            if row[PADDLE_E_SD] > 0.0 or row[SPIN_SD] > 0.0:
+                luck = draw(keys[b], collisions[b], movers * (i + 1) + j)
+                sds = row[PADDLE_E_SD], row[SPIN_SD]
+                restitution, kick = at_paddle(luck, restitution, *sds)
         if i < 0:
             most = 1.0 if role[j] == PUCK else restitution
             restitution = wall_restitution(-speed, row[WALL_E], row[WALL_SLOPE])
             restitution = min(restitution, most)
             friction = row[WALL_MU] if role[j] == PUCK else 0.0
+            scatters = row[WALL_E_SD] > 0.0 or row[WALL_EXIT_SD] > 0.0
+            if role[j] == PUCK and scatters:
+                luck = draw(keys[b], collisions[b], movers * (movers - i) + j)
+                sds = row[WALL_E_SD], row[WALL_EXIT_SD]
+                restitution, kick = at_wall(luck, -speed, restitution, *sds)
         pairs[n, 0], pairs[n, 1] = i, j
         contacts[n, NX], contacts[n, NY] = nx, ny
         contacts[n, RESTITUTION], contacts[n, FRICTION] = restitution, friction
+        contacts[n, KICK] = kick
         return speed
 
     def cross(b: int) -> None:
@@ -297,6 +314,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             if hits and not solved:
                 solve(m, role, hide_constant(VX), pairs, contacts, visits, kept, n)
                 keep_below_the_cap()
+                collisions[b] += 1
                 stale = solved = True
                 continue
             solved = False

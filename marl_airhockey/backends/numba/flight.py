@@ -110,7 +110,7 @@ def _fill(array: Array, value: float) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _gather(batch: Batch, start: int, count: int, m: Array) -> None:
     """Fill the rows of a block of worlds."""
-    static, coefficients, commands, previous, result = batch
+    static, coefficients, commands, previous, result = batch[:5]
     paddles, pucks, blocks, dt = *static[:3], static.control_dt
     first, last, half = paddles + pucks, paddles + pucks + blocks, 0.5 * dt
     position, velocity, goal = previous.position, previous.velocity, commands.goal
@@ -217,7 +217,7 @@ def _find_room_between(batch: Batch, count: int, m: Array) -> None:
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def _move(batch: Batch, start: int, count: int, m: Array, busy: Array) -> None:
     """Move bodies: paddles on ramps, pucks in free flight."""
-    static, coefficients, _, previous, result = batch
+    static, coefficients, _, previous, result = batch[:5]
     paddles, pucks, blocks, dt = *static[:3], static.control_dt
     first, last = paddles + pucks, paddles + pucks + blocks
     for i in range(paddles):

@@ -32,8 +32,11 @@ from marl_airhockey.backends.numba.bodies import (
 from marl_airhockey.core.laws import impulse
 from marl_airhockey.types import Array
 
-NX, NY, RESTITUTION, FRICTION = range(4)
-"""Columns of a contact: unit normal from the first body to the second, and the laws."""
+NX, NY, RESTITUTION, FRICTION, KICK = range(5)
+CONTACT = 5
+"""Columns of a contact: unit normal from the first body to the second, the laws, and
+what scatter adds to the puck: speed along a wall (m/s), or at a paddle speed of the
+edge per speed of the puck."""
 
 TINY = 1e-9
 """Closing speed that is none (m/s)."""
@@ -89,6 +92,19 @@ def strike(
         m[i, at + 1] -= wi * y
 
 
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def scatter(
+    m: Array, at: int, i: int, j: int, nx: float, ny: float, kick: float
+) -> None:
+    """Add to a puck what its contact scatters, see `KICK`."""
+    if i < 0:
+        m[j, at] -= kick * ny
+        m[j, at + 1] += kick * nx
+    else:
+        speed = np.sqrt(m[j, at] ** 2 + m[j, at + 1] ** 2)
+        m[j, SPIN] += kick * speed / m[j, RADIUS]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _hardest(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int, kind: int
@@ -127,7 +143,7 @@ def solve(
         role: roles (N,), changed where a prescribed paddle leaves a puck no room.
         at: column of the velocities that change: VX or DX.
         pairs: bodies of each contact (n or more, 2).
-        contacts: (n or more, 4).
+        contacts: (n or more, CONTACT).
         visits: work space (n or more,).
         kept: work space (N, 3).
         n: number of contacts.
@@ -138,6 +154,8 @@ def solve(
         nx, ny = contacts[0, NX], contacts[0, NY]
         contact = nx, ny, contacts[0, RESTITUTION], contacts[0, FRICTION]
         strike(m, at, i, j, contact, shares(m, role, i, j, False))
+        if contacts[0, KICK] != 0.0:
+            scatter(m, at, i, j, nx, ny, contacts[0, KICK])
         return
     top, paddle = 0.0, False
     for i in range(len(m)):
@@ -163,6 +181,8 @@ def solve(
         i, j = pairs[c, 0], pairs[c, 1]
         contact = contacts[c, NX], contacts[c, NY], restitution, contacts[c, FRICTION]
         strike(m, at, i, j, contact, shares(m, role, i, j, False))
+        if visits[c] == 1 and contacts[c, KICK] != 0.0:
+            scatter(m, at, i, j, contact[0], contact[1], contacts[c, KICK])
     if calm and paddle:
         for i in range(len(m)):
             x, y = m[i, at], m[i, at + 1]

@@ -20,6 +20,7 @@ from marl_airhockey.backends.numba.arrays import (
 from marl_airhockey.backends.numba.bodies import BODY
 from marl_airhockey.backends.numba.busy import advance_busy
 from marl_airhockey.backends.numba.flight import block_space, fly_freely
+from marl_airhockey.backends.numba.impacts import CONTACT
 from marl_airhockey.types import Array
 
 
@@ -31,7 +32,7 @@ def work_space(static: Static, worlds: int) -> tuple[Array, Array]:
     movers = static.paddles + static.pucks + static.blocks
     walls = len(static.walls)
     size = movers * (movers + walls + len(static.obstacles))
-    floats = movers * (BODY + 3) + 4 * size + static.walls.size
+    floats = movers * (BODY + 3) + CONTACT * size + static.walls.size
     return np.zeros((worlds, floats)), np.zeros((worlds, movers + 5 * size), np.int64)
 
 
@@ -77,6 +78,8 @@ def advance(
     against: Array,
     out: Array,
     pinned: Array,
+    keys: Array,
+    collisions: Array,
     work: Array,
     indices: Array,
 ) -> None:
@@ -102,7 +105,7 @@ def advance(
         *(position, velocity, angle, spin, time, touched, touched_at, touching),
         *(banked, crossed, crossed_velocity, lifted, path, against, out, pinned),
     )
-    batch = Batch(static, coefficients, commands, previous, result)
+    batch = Batch(static, coefficients, commands, previous, result, keys, collisions)
     busy = np.empty(len(coefficients), np.bool_)
     blocked = block_space(paddles + pucks + blocks)
     if fly_freely(batch, busy, blocked):

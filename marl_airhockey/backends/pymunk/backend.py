@@ -45,6 +45,10 @@ class PymunkBackend(Backend):
             row = {name: float(value[i]) for name, value in values.items()}
             self.spaces[i].set_physics(row)
 
+    def key_scatter(self, keys: Array, worlds: Array) -> None:
+        for i in worlds.tolist():
+            self.spaces[i].key_scatter(keys[i])
+
     def reset(self, state: State, worlds: Array) -> None:
         super().reset(state, worlds)
         for i in worlds.tolist():

@@ -25,7 +25,8 @@ from marl_airhockey.backends.pymunk.building import (
 )
 from marl_airhockey.contracts.backend import PATIENCE
 from marl_airhockey.core.laws import cap, fly, wall_restitution
-from marl_airhockey.core.physics import PARAMETERS, PUCK_SPEED_CAP
+from marl_airhockey.core.parameters import PARAMETERS, PUCK_SPEED_CAP, SCATTER
+from marl_airhockey.core.scatter import at_paddle, at_wall, draw
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import reaches
 from marl_airhockey.core.table import GRAVITY
@@ -72,13 +73,21 @@ class Space:
         """Positions at which pucks left play, by puck, m."""
         self._initial_contacts: set[tuple[int, int]] = set()
         """Pairs of puck and side in contact at a reset, which is no new bounce."""
+        self._key, self._collisions, self._scatters = np.uint64(0), 0, False
+        self._kicks: dict[tuple[pymunk.Shape, ...], float] = {}
+        """What scatter adds to contacts that begin, see `core.scatter`."""
         self._contact = False
         """True if a paddle touches a puck, or a puck has crossed a goal line."""
-        space.on_collision(
-            PADDLE, PUCK, begin=self._touch, pre_solve=self._hit, separate=self._part
-        )
-        space.on_collision(PUCK, GOAL_LINE, begin=self._cross, pre_solve=self._bounce)
-        space.on_collision(PUCK, WALL, begin=self._bank, pre_solve=self._bounce)
+        at_paddle = {"begin": self._touch, "separate": self._part}
+        for kind, other, begin in (
+            (PADDLE, PUCK, at_paddle),
+            (PUCK, GOAL_LINE, {"begin": self._cross}),
+            (PUCK, WALL, {"begin": self._bank}),
+        ):
+            solve = self._hit if kind == PADDLE else self._bounce
+            space.on_collision(
+                kind, other, **begin, pre_solve=solve, post_solve=self._kick
+            )
         space.on_collision(PUCK, PUCK, pre_solve=self._meet)
         for kind in (PADDLE, WALL, GOAL_LINE, BLOCK, PUCK):
             space.on_collision(BLOCK, kind, pre_solve=self._shove)
@@ -89,6 +98,7 @@ class Space:
     def set_physics(self, values: dict[str, float]) -> None:
         """Set the physical parameters by name."""
         self._values = values
+        self._scatters = any(values[name] > 0.0 for name in SCATTER)
         angles = np.radians([values["tilt"], values["cross_tilt"]])
         self._pull = (
             -float(GRAVITY * np.sin(angles[0])),
@@ -109,6 +119,10 @@ class Space:
             )
             if self.scene.block_shape == "square":
                 body.moment = mass * (2 * half) ** 2 / 6
+
+    def key_scatter(self, key: np.uint64) -> None:
+        """Set the key of the contacts' scatter; collisions are counted from 0 again."""
+        self._key, self._collisions = key, 0
 
     def reset(
         self,
@@ -309,8 +323,33 @@ class Space:
 
     def _hit(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         """Set the laws of a puck at a paddle."""
-        arbiter.restitution = self._values["paddle_restitution"]
+        restitution = self._values["paddle_restitution"]
+        if self._scatters and arbiter.is_first_contact:
+            names = "paddle_restitution_scatter", "spin_scatter"
+            sds = [self._values[name] for name in names]
+            drawn = at_paddle(self._draw(), restitution, *sds)
+            restitution, self._kicks[arbiter.shapes] = drawn
+        arbiter.restitution = restitution
         arbiter.friction = self._values["paddle_friction"]
+
+    def _draw(self) -> tuple[float, float, float]:
+        """Draw the scatter of the next collision."""
+        self._collisions += 1
+        return draw(self._key, self._collisions, 0)
+
+    def _kick(self, arbiter: pymunk.Arbiter, *_: object) -> None:
+        """Add to a puck what its first contact scatters."""
+        kick = self._kicks.pop(arbiter.shapes, 0.0)
+        if kick == 0.0:
+            return
+        shape, other = self._ordered(arbiter, PUCK)
+        body = shape.body
+        assert body is not None
+        if other.collision_type == PADDLE:
+            speed = body.velocity.length / self.scene.table.puck_radius
+            body.angular_velocity += kick * speed
+        else:
+            body.velocity += kick * arbiter.normal.perpendicular()
 
     def _meet(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         """Set the laws of two pucks."""
@@ -319,7 +358,14 @@ class Space:
 
     def _bounce(self, arbiter: pymunk.Arbiter, *_: object) -> None:
         """Set the laws of a puck at a wall."""
-        arbiter.restitution = self._at_wall(arbiter, PUCK)
+        restitution = self._at_wall(arbiter, PUCK)
+        if self._scatters and arbiter.is_first_contact:
+            names = "wall_restitution_scatter", "wall_exit_scatter"
+            sds = [self._values[name] for name in names]
+            speed = self._closing(arbiter, PUCK)
+            drawn = at_wall(self._draw(), speed, restitution, *sds)
+            restitution, self._kicks[arbiter.shapes] = drawn
+        arbiter.restitution = restitution
         arbiter.friction = self._values["wall_friction"]
 
     def _shove(self, arbiter: pymunk.Arbiter, *_: object) -> None:
@@ -335,11 +381,15 @@ class Space:
 
     def _at_wall(self, arbiter: pymunk.Arbiter, kind: int) -> float:
         """Return the restitution at a wall, which depends on the normal speed."""
-        shape, _wall = self._ordered(arbiter, kind)
-        assert shape.body is not None
-        speed = abs(shape.body.velocity.dot(arbiter.normal))
         names = "wall_restitution", "wall_restitution_slope"
-        return float(wall_restitution(speed, *(self._values[n] for n in names)))
+        values = (self._values[name] for name in names)
+        return float(wall_restitution(self._closing(arbiter, kind), *values))
+
+    def _closing(self, arbiter: pymunk.Arbiter, kind: int) -> float:
+        """Return the speed of a body of a kind along the normal of a contact, m/s."""
+        shape, _other = self._ordered(arbiter, kind)
+        assert shape.body is not None
+        return abs(shape.body.velocity.dot(arbiter.normal))
 
     @staticmethod
     def _ordered(

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from marl_airhockey.backends.robosuite.cholesky import factor, solve
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.types import Array
 
 

@@ -12,7 +12,7 @@ from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.backends.robosuite.models import RAIL, SLIDES
 from marl_airhockey.backends.robosuite.restitution import solref
 from marl_airhockey.backends.robosuite.sliding import Sliding, apply_laws
-from marl_airhockey.core.physics import PARAMETERS
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
 from marl_airhockey.types import Array
