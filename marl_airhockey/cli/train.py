@@ -45,7 +45,7 @@ def train(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
     engine: Annotated[
-        str | None, typer.Option(help="sb3 in this process (usual), rllib over many.")
+        str | None, typer.Option(help="torch (usual), sb3, or rllib over many.")
     ] = None,
     num_env_runners: Annotated[
         int | None, typer.Option(help="Of rllib: processes that step the worlds.")

@@ -15,7 +15,10 @@ from stable_baselines3.common.logger import (
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv
+from marl_airhockey.registry import find_backend
+from marl_airhockey.world.build import compile_world
 
 
 class AdaptiveRate:
@@ -57,6 +60,16 @@ def training_threads(count: int) -> Iterator[None]:
         yield
     finally:
         torch.set_flush_denormal(False)
+
+
+def start_clock(run: TrainingRun) -> None:
+    """Count the time of training from now on, after what is compiled once.
+
+    Arms are slow to build and compile next to nothing, so they are left alone.
+    """
+    if find_backend(run.config.backend).ideal:
+        compile_world(run.config.scenario, run.config.keywords)
+    run.start_clock()
 
 
 def make_logger(folder: Path, steps: int) -> Logger:

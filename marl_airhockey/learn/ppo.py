@@ -22,6 +22,7 @@ from marl_airhockey.learn.engine import (
     AdaptiveRate,
     make_logger,
     note_step,
+    start_clock,
     training_threads,
 )
 from marl_airhockey.learn.grade import Metrics, grade
@@ -30,7 +31,6 @@ from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.policies import policy_driver
-from marl_airhockey.world.build import compile_world
 
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
@@ -138,9 +138,8 @@ class Trainer:
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
         self._logger = make_logger(run.folder, run.progress.steps)
-        compile_world(config.scenario, config.keywords)
         self._seen = self._env.reset()
-        run.start_clock()
+        start_clock(run)
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""
@@ -177,10 +176,8 @@ class Trainer:
                 kept.observation[t] = model.scaled(torch.from_numpy(self._seen))
                 mean = model.actor(kept.observation[t])
                 action = mean + spread * torch.randn_like(mean)
-                kept.action[t], kept.density[t] = (
-                    action,
-                    model.log_density(mean, action),
-                )
+                kept.action[t] = action
+                kept.density[t] = model.log_density(mean, action)
                 asked = action.clamp(-1.0, 1.0).numpy()
                 self._seen, reward, done, infos = env.step(asked)
                 kept.reward[t] = torch.from_numpy(reward)

@@ -9,14 +9,18 @@ from stable_baselines3 import PPO
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig, load_config
-from marl_airhockey.learn.engine import AdaptiveRate, make_logger, training_threads
+from marl_airhockey.learn.engine import (
+    AdaptiveRate,
+    make_logger,
+    start_clock,
+    training_threads,
+)
 from marl_airhockey.learn.grade import Metrics
 from marl_airhockey.learn.network import FixedScale, policy_card
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.sb3_callback import TrainingCallback
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.toolkit.policies import load_weights
-from marl_airhockey.world.build import compile_world
 
 
 def train_with_sb3(run: TrainingRun) -> Metrics:
@@ -40,8 +44,7 @@ def _train(run: TrainingRun) -> Metrics:
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(make_logger(folder, progress.steps))
     callback = TrainingCallback(run, rate)
-    compile_world(config.scenario, config.keywords)
-    run.start_clock()
+    start_clock(run)
     fresh = progress.steps == 0
     model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
     row = callback.evaluate()
