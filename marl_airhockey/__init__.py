@@ -1,5 +1,6 @@
 """Air hockey for robot learning and multi-agent reinforcement learning."""
 
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -11,6 +12,7 @@ if not (_here / "scenarios").is_dir():
 from marl_airhockey.envs.registration import register_all  # noqa: E402
 from marl_airhockey.experiment import evaluate, league, train  # noqa: E402
 from marl_airhockey.make import (  # noqa: E402
+    GameFinder,
     env,
     gym_env,
     make_sb3_vec,
@@ -29,6 +31,7 @@ from marl_airhockey.registry import (  # noqa: E402
 from marl_airhockey.toolkit.policies import load_policy  # noqa: E402
 
 register_all()
+sys.meta_path.append(GameFinder())
 
 __version__ = "0.1.0"
 __all__ = [

@@ -5,7 +5,10 @@ What needs gymnasium, pettingzoo or stable-baselines3 is imported when it is bui
 
 from __future__ import annotations
 
+import re
 from functools import partial
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -94,6 +97,34 @@ def make_sb3_vec(
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 
     return AirHockeyVecEnv(scenario, num_worlds, **keywords)
+
+
+class GameFinder(MetaPathFinder, Loader):
+    """Finder of ``import marl_airhockey.duel_v0``, for those who import by name."""
+
+    def find_spec(
+        self, fullname: str, path: object, target: object = None
+    ) -> ModuleSpec | None:
+        """Return the spec of a scenario with a version; None for all else."""
+        package, _, name = fullname.rpartition(".")
+        if package != __package__ or not VERSIONED.fullmatch(name):
+            return None
+        return ModuleSpec(fullname, self)
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        """Return the module of a game."""
+        name = spec.name.rpartition(".")[2]
+        try:
+            return versioned_module(name)
+        except AttributeError as error:
+            raise ModuleNotFoundError(str(error), name=spec.name) from error
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Do nothing: the module is whole."""
+
+
+VERSIONED = re.compile(r"[a-z]\w*_v\d+")
+"""Name of a scenario and its version."""
 
 
 def versioned_module(name: str) -> ModuleType:

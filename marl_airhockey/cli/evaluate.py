@@ -24,6 +24,7 @@ from marl_airhockey.cli.options import (
     bar,
     console,
     environment,
+    scenario_for,
 )
 from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
@@ -36,7 +37,7 @@ FLOORS = ("still", "random", "sticky")
 @app.command("evaluate")
 def evaluate_driver(
     driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
-    scenario: Scenario,
+    scenario: Scenario = None,
     backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     episodes: Annotated[int, typer.Option(help="How many.")] = 200,
@@ -54,7 +55,7 @@ def evaluate_driver(
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     seated = make_agent(driver)
-    entries = [(driver, seated)]
+    entries, scenario = [(driver, seated)], scenario_for(seated, scenario)
     if isinstance(seated, Policy):
         sampled = replace(seated, deterministic=False)
         entries.append((f"{driver} (sampled)", sampled))

@@ -10,8 +10,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.physics import load_physics
 from marl_airhockey.jit.threads import use_threads
+from marl_airhockey.registry import runs_code
+from marl_airhockey.toolkit.policies import Policy
 from marl_airhockey.toolkit.trust import Trust
 from marl_airhockey.world.build import Keywords
 
@@ -26,7 +29,12 @@ app = typer.Typer(
 )
 console = Console()
 
-Scenario = Annotated[str, typer.Option("--scenario", "-s", help="Name of a scenario.")]
+Scenario = Annotated[
+    str | None,
+    typer.Option(
+        "--scenario", "-s", help="What is played; None: what it was trained in."
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Backend = Annotated[str, typer.Option(help="Physics.")]
 Profile = Annotated[str, typer.Option(help="ideal, or a robot's: ur5e, gantry.")]
@@ -81,6 +89,19 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
         except tomllib.TOMLDecodeError:
             chosen[name] = value
     return chosen
+
+
+def scenario_for(driver: Driver, given: str | None) -> str:
+    """Return the scenario that a driver plays: as given, or that of its training.
+
+    Raises:
+        ValueError: neither is there; a name of code is not taken from a policy's file.
+    """
+    trained = driver.scenario if isinstance(driver, Policy) else ""
+    found = given or ("" if runs_code(trained) else trained)
+    if not found:
+        raise ValueError("--scenario: say what the driver is to play")
+    return found
 
 
 def environment(

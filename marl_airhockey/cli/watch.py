@@ -13,10 +13,12 @@ from marl_airhockey.cli.options import (
     Drivers,
     Options,
     Profile,
+    Scenario,
     Trusting,
     app,
     console,
     environment,
+    scenario_for,
 )
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
@@ -26,9 +28,7 @@ def watch(
     driver: Annotated[
         str, typer.Argument(help="A driver's name, a policy's path, or a recording.")
     ],
-    scenario: Annotated[
-        str, typer.Option("--scenario", "-s", help="What the driver plays.")
-    ] = "",
+    scenario: Scenario = None,
     backend: Backend = DEFAULT_BACKEND,
     profile: Profile = "ideal",
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
@@ -60,11 +60,10 @@ def watch(
         return
     if any(Path(driver).glob("*.jsonl")):
         raise ValueError(f"{driver}: holds recordings; name one of its .jsonl files")
-    if not scenario:
-        raise ValueError("--scenario: say what the driver is to play")
     keywords = environment(backend, profile, option, other)
     player = make_agent(driver)
-    show_episodes(scenario, player, keywords, seed, episodes, video, camera=camera)
+    game = scenario_for(player, scenario)
+    show_episodes(game, player, keywords, seed, episodes, video, camera=camera)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 

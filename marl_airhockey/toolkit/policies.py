@@ -49,6 +49,8 @@ class Policy(Driver):
     deterministic: bool = True
     noise: Array | None = None
     """Standard deviation of sampled actions (2,), if `predict` returns only means"""
+    scenario: str = ""
+    """Scenario that it was trained in, if it is known"""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -141,6 +143,7 @@ def policy_driver(
         source,
         deterministic,
         np.exp(policy.log_std),
+        policy.card.get("scenario", ""),
     )
 
 

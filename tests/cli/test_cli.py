@@ -46,6 +46,13 @@ def test_evaluate_prints_what_papers_need():
     assert data["episodes"] == 30
 
 
+def test_a_policy_is_measured_where_it_was_trained_unless_told_otherwise():
+    words = ("evaluate", "zoo/touch", "--episodes", 5, "--no-floors", "--json")
+    assert json.loads(airhockey(*words).stdout)["scenario"] == "touch"
+    told = airhockey("evaluate", "striker", "--episodes", 5, ok=False).stderr
+    assert "--scenario: say what the driver is to play" in told
+
+
 def test_watch_writes_a_film(tmp_path):
     for name in ("a.gif", "a.mp4"):
         airhockey("watch", "striker", "-s", "strike", "--video", tmp_path / name)

@@ -1,5 +1,7 @@
 """Open and driven seats as PettingZoo sees them."""
 
+import importlib
+
 import gymnasium
 import numpy as np
 import pytest
@@ -66,4 +68,11 @@ def test_games_are_imported_as_those_of_pettingzoo():
     max_cycles_test(duel_v0)
     with pytest.raises(ImportError, match="plays duel_v0"):
         from marl_airhockey import duel_v7  # noqa: F401
+    rally = importlib.import_module("marl_airhockey.rally_v0")
+    assert rally.parallel_env().possible_agents == ["paddle_0", "paddle_1"]
+    for wrong in ("marl_airhockey.dule_v0", "marl_airhockey.nothing"):
+        with pytest.raises(ModuleNotFoundError):
+            importlib.import_module(wrong)
+    with pytest.raises(ImportError, match="plays duel_v0"):
+        importlib.import_module("marl_airhockey.duel_v3")
     assert not hasattr(ah, "duell_v0")
