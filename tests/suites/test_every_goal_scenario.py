@@ -36,7 +36,7 @@ def test_it_passes_the_checks_of_goal_environments(goal_scenario):
 @pytest.mark.parametrize("profile", PROFILES)
 def test_reward_success_and_compute_reward_agree(goal_scenario, profile):
     """Reward and end follow what is shown, success the truth."""
-    worlds = 24
+    worlds = 200
     driver = "reacher" if goal_scenario.startswith("reach") else "striker"
     world = ah.make_world(
         goal_scenario,
