@@ -2,7 +2,6 @@
 
 import sys
 from pathlib import Path
-from types import ModuleType
 
 _here = Path(__file__).parent
 if not (_here / "scenarios").is_dir():
@@ -19,7 +18,6 @@ from marl_airhockey.make import (  # noqa: E402
     make_vec,
     make_world,
     parallel_env,
-    versioned_module,
 )
 from marl_airhockey.registry import (  # noqa: E402
     agent_names,
@@ -51,8 +49,3 @@ __all__ = [
     "scenario_names",
     "train",
 ]
-
-
-def __getattr__(name: str) -> ModuleType:
-    # `from marl_airhockey import duel_v0`, as tutorials for PettingZoo import a game.
-    return versioned_module(name)

@@ -99,53 +99,43 @@ def make_sb3_vec(
     return AirHockeyVecEnv(scenario, num_worlds, **keywords)
 
 
+VERSIONED = re.compile(r"([a-z]\w*)_v(\d+)")
+"""Name of a scenario and its version."""
+
+
 class GameFinder(MetaPathFinder, Loader):
-    """Finder of ``import marl_airhockey.duel_v0``, for those who import by name."""
+    """Finder of modules as PettingZoo's own games are: ``duel_v0.parallel_env()``.
+
+    They are found by ``from marl_airhockey import duel_v0`` and by
+    ``import marl_airhockey.duel_v0``.
+    """
 
     def find_spec(
         self, fullname: str, path: object, target: object = None
     ) -> ModuleSpec | None:
-        """Return the spec of a scenario with a version; None for all else."""
+        """Return the spec of a scenario with a version; None for all else.
+
+        Raises:
+            ImportError: another version of a scenario.
+        """
         package, _, name = fullname.rpartition(".")
-        if package != __package__ or not VERSIONED.fullmatch(name):
+        found = VERSIONED.fullmatch(name)
+        if package != __package__ or not found or found[1] not in scenario_names():
             return None
-        return ModuleSpec(fullname, self)
+        current = make_scenario(found[1]).version
+        if int(found[2]) != current:
+            raise ImportError(
+                f"{name}: this release of marl_airhockey plays {found[1]}_v{current}"
+            )
+        return ModuleSpec(fullname, self, loader_state=found[1])
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         """Return the module of a game."""
-        name = spec.name.rpartition(".")[2]
-        try:
-            return versioned_module(name)
-        except AttributeError as error:
-            raise ModuleNotFoundError(str(error), name=spec.name) from error
+        module = ModuleType(spec.name, f"PettingZoo game {spec.loader_state}.")
+        vars(module)["parallel_env"] = partial(parallel_env, spec.loader_state)
+        vars(module)["env"] = partial(env, spec.loader_state)
+        vars(module)["raw_env"] = module.env
+        return module
 
     def exec_module(self, module: ModuleType) -> None:
         """Do nothing: the module is whole."""
-
-
-VERSIONED = re.compile(r"[a-z]\w*_v\d+")
-"""Name of a scenario and its version."""
-
-
-def versioned_module(name: str) -> ModuleType:
-    """Return a module as PettingZoo's own games are: ``duel_v0.parallel_env()``.
-
-    Args:
-        name: of a scenario and its version.
-
-    Raises:
-        AttributeError: no such scenario.
-        ImportError: another version of it.
-    """
-    scenario, mark, version = name.rpartition("_v")
-    if not mark or not version.isdigit() or scenario not in scenario_names():
-        raise AttributeError(f"module 'marl_airhockey' has no attribute {name!r}")
-    current = make_scenario(scenario).version
-    if int(version) != current:
-        raise ImportError(
-            f"{name}: this release of marl_airhockey plays {scenario}_v{current}"
-        )
-    module = ModuleType(f"marl_airhockey.{name}", f"PettingZoo game {name}.")
-    vars(module)["parallel_env"] = partial(parallel_env, scenario)
-    vars(module)["env"] = vars(module)["raw_env"] = partial(env, scenario)
-    return module

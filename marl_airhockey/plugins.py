@@ -17,6 +17,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+author_files: set[str] = set()
+"""Files that texts and entry points have named, to tell an author's code from ours."""
+
 
 def plugins(kind: str) -> dict[str, EntryPoint]:
     """Return entry points of installed packages by name, none of them loaded.
@@ -34,9 +37,11 @@ def load_plugin(entry: EntryPoint) -> Any:
         ValueError: it cannot be imported.
     """
     try:
-        return entry.load()
+        loaded = entry.load()
     except (Exception, SystemExit) as error:
         raise ValueError(_failed(f"{entry.name} ({entry.value})", error)) from error
+    _note(sys.modules[entry.module])
+    return loaded
 
 
 def names_code(text: str) -> bool:
@@ -64,6 +69,7 @@ def load_code(text: str, base: type) -> Any:
     """
     place, _, name = text.partition(":")
     module = _file(Path(place)) if place.endswith(".py") else _module(place)
+    _note(module)
     if name:
         if not hasattr(module, name):
             raise ValueError(f"{place}: it has no {name!r}")
@@ -84,6 +90,11 @@ def load_code(text: str, base: type) -> Any:
             f"which, {place}:NAME"
         )
     return found[0]
+
+
+def _note(module: ModuleType) -> None:
+    if module.__file__ is not None:
+        author_files.add(module.__file__)
 
 
 def _file(path: Path) -> ModuleType:

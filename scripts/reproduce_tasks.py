@@ -1,12 +1,19 @@
-"""Train every task with its preset over several seeds, print the table, draw curves.
+"""Train every task with its preset over several seeds, keep the rows, print the table.
 
-    python scripts/reproduce_tasks.py --seeds 5 --jobs 2 --out runs/tasks
-    python scripts/reproduce_tasks.py --profile ur5e --seeds 1 --out runs/ur5e
+    python scripts/reproduce_tasks.py --seeds 5 --jobs 2
+    python scripts/reproduce_tasks.py --profile ur5e --seeds 5 --jobs 2
+    python scripts/reproduce_tasks.py --profile ur5e --variant truth --seeds 2
+    python scripts/reproduce_tasks.py --profile ur5e --variant 60hz --tasks juggle
 
-A run that is there already is not trained again, so the script can be stopped and
-started. Success is that of the last policy (no checkpoint is picked) over the test
-seeds, which training never sees: on the numba backend that it was trained on, on
-pymunk, and with one control step of action delay that it was not trained with. The
+Each run that ends adds a row to ``docs/data/tasks.csv`` and its curve to
+``docs/data/curves.csv``. A run whose row is there is not trained again, unless its
+settings have changed since, so the script can be stopped and started; delete the rows
+after a change of physics or rules. ``--seeds 0`` trains nothing and prints the table.
+
+Success is that of the last policy (no checkpoint is picked) over the test seeds, which
+training never sees: on the numba backend that it was trained on, on pymunk, with the
+arm of robosuite, and with one control step more of action delay. The variant "truth"
+has a profile's physics and servo but sees the true state: what sensing costs. The
 paper's column is the row of Table I for RL in its 2D simulator (arXiv 2405.03113),
 under the paper's own rules and physics.
 """
@@ -14,7 +21,8 @@ under the paper's own rules and physics.
 from __future__ import annotations
 
 import csv
-import json
+import dataclasses
+import hashlib
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,11 +35,12 @@ from rich.table import Table
 from marl_airhockey import make_agent
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.config import TrainConfig, preset
 from marl_airhockey.learn.plots import plot_seed_curves
 from marl_airhockey.learn.train import train
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.sensor import SENSED
 
 PAPER = {
     "reach": 1.0,
@@ -46,65 +55,128 @@ PAPER = {
     "hit_goal_velocity": 0.0,
 }
 """Success of RL in the paper, by task"""
-EPISODES = 2000
-"""Episodes by which a policy is measured"""
+EPISODES, SLOW_EPISODES = 2000, 200
+"""Episodes by which a policy is measured, and on the slower backends"""
 THRESHOLDS = (0.5, 0.9, 0.95)
 """Levels of success to which the CPU time is reported"""
+VARIANTS: dict[str, dict[str, Any]] = {
+    "": {},
+    "truth": {"observe": "velocity", "physics": dict.fromkeys(SENSED, 0.0)},
+    # The same horizon and the same time in a rollout as at 20 Hz.
+    "60hz": {"control_dt": 1 / 60, "gamma": 0.9967, "gae_lambda": 0.983, "n_steps": 96},
+}
+"""Settings that replace a preset's, by the name of the variant"""
+DATA = Path(__file__).parent.parent / "docs" / "data"
+"""Folder of the committed rows"""
+KEY = ("task", "profile", "variant", "seed")
 HEADERS = (
     *("task", "success", "worst seed", "95 % interval", "sampled", "first shot"),
-    *("on pymunk", "delayed", "CPU-min", "M steps", "CPU-s to .5 / .9 / .95"),
-    *("still", "random", "sticky", "paper's RL"),
+    *("on pymunk", "with the arm", "delayed", "CPU-min", "M steps"),
+    *("CPU-s to .5 / .9 / .95", "still", "random", "sticky", "paper's RL"),
 )
+CURVE = ("steps", "cpu_seconds", "success")
+Row = dict[str, Any]
+Rows = list[Row]
 
 
-def train_seed(scenario: str, profile: str, seed: int, folder: Path) -> dict[str, Any]:
-    """Train one seed and measure its last policy; return the row of results."""
-    result = folder / "result.json"
-    if result.exists():
-        return dict(json.loads(result.read_text()))
-    config = preset(scenario, {"seed": seed, "profile": profile})
-    train(None if (folder / "config.toml").exists() else config, folder)
-    numba: Keywords = {"profile": profile, "backend": "numba"}
-    pymunk: Keywords = {"profile": profile, "backend": "pymunk"}
-    delayed: Keywords = {**numba, "physics": {"action_delay": 0.05}}
-    cases = {
-        "success": (True, numba),
-        "sampled": (False, numba),
-        "pymunk": (True, pymunk),
-        "delayed": (True, delayed),
+def config_of(task: str, profile: str, variant: str, seed: int) -> TrainConfig:
+    """Return the preset of a task in a profile, with what a variant changes."""
+    changes = {"profile": profile, "seed": seed, **VARIANTS[variant]}
+    if variant == "truth":  # Nothing is sensed, so the preset is that of ideal.
+        return dataclasses.replace(preset(task), **changes)
+    return preset(task, changes)
+
+
+def recipe(config: TrainConfig) -> str:
+    """Return a short name of all settings but the seed.
+
+    Those at their defaults are left out, so that another setting changes no name.
+    """
+    usual = {f.name: f.default for f in dataclasses.fields(config)}
+    settings = {
+        name: value
+        for name, value in dataclasses.asdict(config).items()
+        if name != "seed" and value != usual[name]
     }
-    if scenario == "juggle":
-        for hits in (10, 20):
-            cases[f"{hits} hits"] = (True, {**numba, "options": {"hits": hits}})
-    row: dict[str, Any] = {"scenario": scenario, "profile": profile, "seed": seed}
-    for name, (mean, keywords) in cases.items():
-        policy = load_policy(folder / "last.npz", deterministic=mean)
-        found = evaluate(policy, name, scenario, EPISODES, keywords=keywords)
-        row[name] = found.success
-        if name == "success":
-            row["first_shot"] = found.first_shot
-            row["grade"] = found.deployability.grade
-    curve = evaluations(folder)
-    row["cpu_minutes"] = float(curve[-1]["cpu_seconds"]) / 60
+    return hashlib.sha256(repr(settings).encode()).hexdigest()[:8]
+
+
+def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Rows]:
+    """Train one seed, measure its last policy; return its row and those of its curve.
+
+    Args:
+        config: of the run.
+        variant: name of what it changes.
+        folder: of the run; one that was cut off is gone on with.
+    """
+    train(None if (folder / "config.toml").exists() else config, folder)
+    values = config.scenario, config.profile, variant, config.seed
+    key = dict(zip(KEY, values, strict=True))
+    row: Row = {**key, "recipe": recipe(config), **measure(config, folder)}
+    curve = read(folder / "evaluations.csv")
+    row["cpu_minutes"] = round(float(curve[-1]["cpu_seconds"]) / 60, 2)
     row["steps"] = int(curve[-1]["steps"])
     for level in THRESHOLDS:
         times = [float(c["cpu_seconds"]) for c in curve if float(c["success"]) >= level]
-        row[f"cpu_seconds_to_{level}"] = times[0] if times else None
-    result.write_text(json.dumps(row, indent=1))
+        row[f"cpu_seconds_to_{level}"] = round(times[0], 1) if times else ""
+    points = [{n: round(float(c[n]), 3) for n in CURVE} for c in curve]
+    return row, [{**key, **point} for point in points]
+
+
+def measure(config: TrainConfig, folder: Path) -> Row:
+    """Return the success of a run's last policy in all cases, by the column's name."""
+    usual = config.keywords
+    late: Keywords = {
+        **usual,
+        "physics": {**config.physics, "action_delay": config.control_dt},
+    }
+    cases: dict[str, tuple[bool, int, Keywords]] = {
+        "success": (True, EPISODES, usual),
+        "sampled": (False, EPISODES, usual),
+        "pymunk": (True, SLOW_EPISODES, {**usual, "backend": "pymunk"}),
+        "arm": (True, SLOW_EPISODES, {**usual, "backend": "robosuite"}),
+        "delayed": (True, EPISODES, late),
+    }
+    row: Row = {}
+    for name, (mean, episodes, keywords) in cases.items():
+        policy = load_policy(folder / "last.npz", deterministic=mean)
+        found = evaluate(policy, name, config.scenario, episodes, keywords=keywords)
+        row[name] = round(found.success, 4)
+        if name == "success":
+            row["first_shot"] = round(found.first_shot, 4)
     return row
 
 
-def evaluations(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of a run's ``evaluations.csv``."""
-    with (folder / "evaluations.csv").open() as file:
+def read(path: Path) -> Rows:
+    """Return the rows of a CSV file; none if there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
 
-def floors(scenario: str, profile: str) -> dict[str, float]:
+def keep(path: Path, new: Rows) -> None:
+    """Put rows into a CSV file in place of those of the same runs, in order."""
+    runs = {run_of(row) for row in new}
+    rows = [row for row in read(path) if run_of(row) not in runs] + new
+    rows.sort(key=run_of)  # Stable: a curve's points stay in order.
+    draft = path.with_suffix(".part")
+    with draft.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(new[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    draft.replace(path)
+
+
+def run_of(row: Row) -> tuple[str, ...]:
+    """Return what tells the runs of rows apart."""
+    return tuple(str(row[name]) for name in KEY)
+
+
+def floors(task: str, keywords: Keywords) -> dict[str, float]:
     """Return the success of drivers without skill, by name."""
-    keywords: Keywords = {"profile": profile, "backend": "numba"}
     return {
-        name: evaluate(make_agent(name), name, scenario, EPISODES, 0, keywords).success
+        name: evaluate(make_agent(name), name, task, EPISODES, 0, keywords).success
         for name in ("still", "random", "sticky")
     }
 
@@ -113,73 +185,78 @@ def main(
     tasks: Annotated[str, typer.Option(help="Comma-separated scenarios.")] = ",".join(
         PAPER
     ),
-    seeds: Annotated[int, typer.Option(help="Seeds 0 .. n - 1.")] = 5,
+    seeds: Annotated[int, typer.Option(help="Seeds 0 .. n - 1; 0: print only.")] = 5,
     profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ideal",
+    variant: Annotated[str, typer.Option(help="None, truth or 60hz.")] = "",
     jobs: Annotated[int, typer.Option(help="Processes at once.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/tasks"),
     markdown: Annotated[Path | None, typer.Option(help="Write the table here.")] = None,
+    curves: Annotated[Path | None, typer.Option(help="Draw the curves here.")] = None,
 ) -> None:
-    """Train all tasks, measure the policies, print a table, draw curves."""
-    names = tasks.split(",")
-    console = Console()
-    folders = {
-        (name, seed): out / f"{name}-{profile}-{seed}"
-        for seed in range(seeds)
-        for name in names
-    }
-    rows: list[dict[str, Any]] = []
-    with ProcessPoolExecutor(jobs) as pool:
-        futures = [
-            pool.submit(train_seed, name, profile, seed, folder)
-            for (name, seed), folder in folders.items()
-        ]
+    """Train tasks, keep their rows, print the table of all rows there are."""
+    names, console = tasks.split(","), Console()
+    configs = [config_of(n, profile, variant, s) for s in range(seeds) for n in names]
+    kept = {(*run_of(row), row["recipe"]) for row in read(DATA / "tasks.csv")}
+    DATA.mkdir(exist_ok=True)
+    with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
+        futures = []
+        for config in configs:
+            run = (config.scenario, profile, variant, str(config.seed))
+            if (*run, recipe(config)) not in kept:
+                folder = out / "-".join([*filter(None, run), recipe(config)])
+                futures.append(pool.submit(train_seed, config, variant, folder))
         for future in as_completed(futures):
-            rows.append(future.result())
-            console.print_json(json.dumps(rows[-1]))
-    by_task = {name: [row for row in rows if row["scenario"] == name] for name in names}
-    lines = [line(name, found, profile) for name, found in by_task.items()]
-    table = Table(
-        *HEADERS, title=f"{profile} profile, {seeds} seeds, {EPISODES} episodes"
+            row, curve = future.result()
+            keep(DATA / "tasks.csv", [row])
+            keep(DATA / "curves.csv", curve)
+            console.print(row)
+    shown = (profile, variant)
+    rows, points = (
+        [r for r in read(DATA / name) if (r["profile"], r["variant"]) == shown]
+        for name in ("tasks.csv", "curves.csv")
     )
+    lines = [
+        line(name, found, config_of(name, profile, variant, 0))
+        for name in names
+        if (found := [row for row in rows if row["task"] == name])
+    ]
+    table = Table(*HEADERS, title=f"{profile} profile {variant}, {EPISODES} episodes")
     for cells in lines:
         table.add_row(*cells)
     console.print(table)
-    for row in by_task.get("juggle", []):
-        more = {k: v for k, v in row.items() if str(k).endswith(" hits")}
-        console.print("juggle, seed", row["seed"], more)
-    curves = {
-        name: [evaluations(folders[name, seed]) for seed in range(seeds)]
-        for name in names
-    }
-    picture = out / f"curves_{profile}.png"
-    plot_seed_curves(curves, picture)
-    console.print("learning curves:", picture)
     if markdown is not None:
         ruled = [HEADERS, ("---",) * len(HEADERS), *lines]
         text = "".join(f"| {' | '.join(cells)} |\n" for cells in ruled)
         markdown.write_text(text)
+    if curves is not None:
+        plot_seed_curves({n: runs_of(points, n) for n in names}, curves)
 
 
-def line(name: str, rows: list[dict[str, Any]], profile: str) -> tuple[str, ...]:
+def runs_of(points: Rows, task: str) -> list[Rows]:
+    """Return the curves of a task, one for each seed."""
+    mine = [point for point in points if point["task"] == task]
+    seeds = sorted({point["seed"] for point in mine})
+    return [[p for p in mine if p["seed"] == seed] for seed in seeds]
+
+
+def line(name: str, rows: Rows, config: TrainConfig) -> tuple[str, ...]:
     """Return the cells of a task: means over its seeds, and the floors."""
 
     def mean(key: str) -> float:
-        return float(np.mean([row[key] for row in rows]))
+        return float(np.mean([float(row[key]) for row in rows]))
 
     def seconds_to(level: float) -> str:
         times = [row[f"cpu_seconds_to_{level}"] for row in rows]
-        return "-" if None in times else f"{np.mean(times):.0f}"
+        return "-" if "" in times else f"{np.mean([float(t) for t in times]):.0f}"
 
     low, high = interval(mean("success"), EPISODES * len(rows))
-    floor = floors(name, profile)
+    floor = floors(name, config.keywords)
     return (
         name,
         f"{mean('success'):.3f}",
-        f"{min(row['success'] for row in rows):.3f}",
+        f"{min(float(row['success']) for row in rows):.3f}",
         f"{low:.3f}..{high:.3f}",
-        f"{mean('sampled'):.3f}",
-        f"{mean('first_shot'):.3f}",
-        f"{mean('pymunk'):.3f}",
+        *(f"{mean(k):.3f}" for k in ("sampled", "first_shot", "pymunk", "arm")),
         f"{mean('delayed'):.3f}",
         f"{mean('cpu_minutes'):.1f}",
         f"{mean('steps') / 1e6:.1f}",

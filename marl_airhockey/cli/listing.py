@@ -13,9 +13,10 @@ from marl_airhockey.cli.options import (
     app,
     console,
 )
+from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.profiles import PROFILES
 from marl_airhockey.envs.describe import describe, describe_profile, summary
-from marl_airhockey.registry import runs_code
+from marl_airhockey.registry import plugin_names, runs_code, scenario_names
 
 
 @app.command("list")
@@ -43,13 +44,10 @@ def list_scenarios(
     if scenario in PROFILES:
         _show_profile(scenario, as_json)
         return
-    try:
-        data = describe(scenario)
-    except ValueError as error:
-        if runs_code(scenario):
-            raise
-        profiles = ", ".join(PROFILES)
-        raise ValueError(f"{error}; or a profile: {profiles}") from error
+    known = [*scenario_names(), *plugin_names("scenarios"), *PROFILES]
+    if scenario not in known and not runs_code(scenario):
+        raise ValueError(unknown_name("scenario or profile", scenario, known))
+    data = describe(scenario)
     if as_json:
         console.print_json(json.dumps(data))
         return

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import traceback
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -24,6 +23,7 @@ from marl_airhockey.cli import (
     watch,
 )
 from marl_airhockey.cli.options import app
+from marl_airhockey.plugins import author_files
 
 
 def _tell_version(given: bool) -> None:
@@ -34,8 +34,6 @@ def _tell_version(given: bool) -> None:
 
 # Importing these modules adds their commands to the application.
 __all__ = ["bench", "evaluate", "listing", "main", "new", "train", "warm", "watch"]
-LIBRARIES = {"marl_airhockey", "site-packages", "bin", "scenarios", "agents"}
-"""Folders of code that is not an author's own."""
 app.command()(league.league)
 app.command()(play.play)
 app.command()(transfer.transfer)
@@ -73,7 +71,7 @@ def main() -> None:
 def _place(error: BaseException) -> str:
     """Return the line of an author's own file that an error comes from, if any."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [f for f in frames if LIBRARIES.isdisjoint(Path(f.filename).parts)]
+    own = [f for f in frames if f.filename in author_files]
     return f" ({own[-1].filename}, line {own[-1].lineno})" if own else ""
 
 

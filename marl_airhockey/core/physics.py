@@ -73,7 +73,8 @@ class Physics:
                 max(pair[0], parameter.low),
                 min(pair[1], parameter.high),
             )
-        self._sloping = [n for n in ("tilt", "cross_tilt") if n not in values]
+        fixed = preset.keys() | values.keys()
+        self._sloping = [n for n in ("tilt", "cross_tilt") if n not in fixed]
         """Tilts that a slope in any direction adds to: those that nobody has given"""
         for name, value in values.items():
             pair = _checked(name, value)

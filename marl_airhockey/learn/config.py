@@ -55,6 +55,8 @@ class TrainConfig:
     """Drivers of seats that are not learned, by agent"""
     physics: dict[str, Any] = field(default_factory=dict)
     """Physical parameters, by name: numbers or ranges"""
+    control_dt: float = 0.05
+    """s between two actions; `gamma` is of one of them"""
     engine: str = "torch"
     """"torch" or "sb3" in this process, or "rllib" over many."""
     num_env_runners: int = 0
@@ -185,6 +187,7 @@ class TrainConfig:
             "options": self.options,
             "drivers": self.drivers,
             "physics": self.physics,
+            "control_dt": self.control_dt,
         }
 
     def to_toml(self) -> str:

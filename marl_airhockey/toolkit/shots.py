@@ -88,9 +88,9 @@ def draw_shots(
         some = {name: value[rows] for name, value in some.items()}
         path, moment = roll(struck[rows], STEP, STEPS, half, some), np.empty_like(rows)
         _choose(path, table.size[0] / 2 - table.puck_radius, draws[rows, 3], moment)
-        found = rows[moment >= 0]
-        goals[left[found]] = path[np.flatnonzero(moment >= 0), moment[moment >= 0], :4]
-        left = np.delete(left, found)
+        on = np.flatnonzero(moment >= 0)
+        goals[left[rows[on]]] = path[on, moment[on], :4]
+        left = np.delete(left, rows[on])
         if not len(left):
             break
     return goals

@@ -6,8 +6,6 @@ transitions would contradict real ones. Success stays judged by the truth.
 
 from __future__ import annotations
 
-import numpy as np
-
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
@@ -29,8 +27,8 @@ def judge_sensed(
     """
     episode = moment.episode
     met = game.goal_met(sensed, moment.verdict.memory)
-    reward = np.broadcast_to(1.0 * met[:, None], episode.returns.shape)
+    reward = 1.0 * met[:, None]
     episode.returns[:] += reward - moment.verdict.outcome["reward"]
-    result.reward[:] = result.terms["goal"][:] = 1.0 * met[:, None]
+    result.reward[:] = result.terms["goal"][:] = reward
     result.terminated[:] = met | moment.state.lifted.any(-1)
     result.truncated[:] = (episode.cycles >= limit) & ~result.terminated

@@ -72,8 +72,8 @@ class World:
         self._seeded, self.seeds = False, np.zeros(b, np.int64)
         """(B,) seed of each world"""
         self._scatters = physics.any_of(*SCATTER)
-        purposes = ("start", "physics", "sensor", "serve", "contact")
-        self._streams = StreamSet(b, *purposes[: 5 if self._scatters else 4])
+        contact = ("contact",) if self._scatters else ()
+        self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._state
