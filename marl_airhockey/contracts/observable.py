@@ -17,16 +17,16 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 
-OBSERVE = ("velocity", "history", "pixels")
-"""Forms of the puck in observations: position and velocity; the last sensed positions,
-each with a visibility flag and the age of its frame, as a camera gives them; or
-pictures."""
+OBSERVE = ("velocity", "estimate", "history", "pixels")
+"""Forms of the puck in observations: position and velocity as they are sensed; the same
+estimated for now by a filter that knows the table; the last sensed positions, each with
+a visibility flag and the age of its frame, as a camera gives them; or pictures."""
 
 
 HISTORY = 5
 """Number of sensed positions of a puck in a history."""
 PENDING = 2
-"""Number of the last actions in a history, which may still be on their way."""
+"""Number of the last actions that are shown, which may still be on their way."""
 FRAMES = 3
 """Number of pictures on top of each other in pixels."""
 

@@ -27,14 +27,14 @@ from marl_airhockey.types import Array
 class OwnPaddle(Observable):
     """Position and velocity of the seat's own paddle, as its robot reports them.
 
-    In a history also the last actions, which may still be on their way.
+    In an estimate or a history also the last actions, which may still be on their way.
     """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         centre = float(np.mean([x for x, _ in scope.scene.seats[0].reach]))
         columns = scope.position_columns("own", (0.2, 0.2), centre)
         columns += scope.velocity_columns("own", scope.top_speed, scope.top_speed)
-        if scope.observe == "history":
+        if scope.observe != "velocity":
             for ago in range(PENDING, 0, -1):
                 names = (f"own.asked[-{ago}].{axis}" for axis in "xy")
                 columns += [Column(name, -1.0, 1.0, 1.0) for name in names]
@@ -43,7 +43,7 @@ class OwnPaddle(Observable):
     def write(self, ego: EgoView, out: Array) -> None:
         out[..., :2] = ego.own
         out[..., 2:4] = ego.own_velocity
-        if ego.scope.observe == "history":
+        if ego.scope.observe != "velocity":
             asked = ego.asked.swapaxes(-2, -3)
             out[..., 4:] = asked.reshape(*asked.shape[:-2], -1)
 
@@ -92,30 +92,37 @@ def _others(scene: Scene) -> Array:
 class Pucks(Observable):
     """Position, velocity and spin of every puck, or its sensed history.
 
-    The spin is the speed of the edge, radius times angular velocity, counter-clockwise.
+    An estimate has visibility and age (s) of the newest frame besides. The spin is the
+    speed of the edge, radius times angular velocity, counter-clockwise.
     """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         columns: list[Column] = []
         for i in range(scope.scene.pucks):
-            if scope.observe == "velocity":
-                columns += scope.position_columns(f"puck_{i}", (0.67, 0.25))
-                columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
-                most = PUCK_SPEED_CAP
-                columns.append(Column(f"puck_{i}.spin", -most, most, 0.5))
-            else:
+            if scope.observe == "history":
                 for ago in range(HISTORY - 1, -1, -1):
                     columns += scope.position_columns(f"puck_{i}[-{ago}]", (0.67, 0.25))
-                    columns.append(Column(f"puck_{i}[-{ago}].seen", 0.0, 1.0, 1.0))
-                    columns.append(Column(f"puck_{i}[-{ago}].age", 0.0, 1.0, 0.1))
+                    columns += _frame_columns(f"puck_{i}[-{ago}]")
+                continue
+            columns += scope.position_columns(f"puck_{i}", (0.67, 0.25))
+            columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
+            most = PUCK_SPEED_CAP
+            columns.append(Column(f"puck_{i}.spin", -most, most, 0.5))
+            if scope.observe == "estimate":
+                columns += _frame_columns(f"puck_{i}")
         return columns
 
     def write(self, ego: EgoView, out: Array) -> None:
-        if ego.scope.observe == "velocity":
+        if ego.scope.observe != "history":
+            estimate = ego.scope.observe == "estimate"
+            size = 7 if estimate else 5
             for i in range(ego.scope.scene.pucks):
-                out[..., 5 * i : 5 * i + 2] = ego.puck[..., i, :]
-                out[..., 5 * i + 2 : 5 * i + 4] = ego.puck_velocity[..., i, :]
-                out[..., 5 * i + 4] = ego.puck_edge[..., i]
+                part = out[..., size * i : size * (i + 1)]
+                part[..., :2] = ego.puck[..., i, :]
+                part[..., 2:4] = ego.puck_velocity[..., i, :]
+                part[..., 4] = ego.puck_edge[..., i]
+                if estimate:
+                    part[..., 5:] = ego.history[..., None, -1, i, 2:]
             return
         lead = ego.history.shape[:-3]
         flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 4)
@@ -123,6 +130,11 @@ class Pucks(Observable):
         seen = np.broadcast_to(flat[..., None, :, 2:], place.shape)
         both = np.concatenate([place, seen], -1)
         out[...] = both.reshape(out.shape)
+
+
+def _frame_columns(name: str) -> list[Column]:
+    """Return the columns of what a camera says of a frame."""
+    return [Column(f"{name}.seen", 0.0, 1.0, 1.0), Column(f"{name}.age", 0.0, 1.0, 0.1)]
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,8 @@ def build_world(
             seats: "robot" or "arcade".
             profile: "ideal", or what a robot senses and how far physics may vary:
                 "ur5e", "ur5e-authors" or "gantry", see `profiles.PROFILES`.
-            observe: "velocity" (in the ideal profile), "history" (in the others) or
-                "pixels".
+            observe: "velocity" (in the ideal profile), "history" (in the others),
+                "estimate" or "pixels", see `observable.OBSERVE`.
             goals: "flat" or "dict".
             physics: a preset's name, a TOML file, or parameters by name, values or
                 (low, high) drawn per episode, which may name a ``preset``.

@@ -53,6 +53,7 @@ class Observer:
         if observe not in OBSERVE:
             raise ValueError(unknown_name("observe", observe, OBSERVE))
         self.sensor.keeps_history |= observe != "velocity"
+        self.sensor.estimates |= observe == "estimate"
         if observe not in self._layouts:
             form = "velocity" if observe == "pixels" else observe
             scope = ObservationContext(self.scenario.scene, form, self._top_speed)
@@ -102,9 +103,15 @@ class Observer:
         if observe == "pixels":
             return self._pictures(memory, seats, worlds)
         self.prepare(observe)
-        history = self.sensor.past(worlds)
-        (shown,) = self._shows[observe](vars(sensed), memory, history)
+        source = self._source(sensed, observe, worlds)
+        (shown,) = self._shows[observe](source, memory, self.sensor.past(worlds))
         return self.take(shown, seats)
+
+    def _source(self, sensed: State, observe: str, worlds: Rows = ALL) -> Source:
+        """Return the arrays of the state that a form of observations shows."""
+        if observe == "estimate":
+            sensed = self.sensor.estimated(sensed, worlds)
+        return vars(sensed)
 
     def blank(self, observe: str | None, rows: int) -> Observation:
         """Return observations of one seat that are all zeros, (rows, ...) each.
@@ -211,8 +218,9 @@ class Observer:
             kept = {name: array[worlds] for name, array in memory.items()}
             fresh = self._pictures(kept, seats, worlds)
         else:
-            sources = vars(sensed), memory, self.sensor.past()
-            (shown,) = self._shows[self.observe].at(worlds, *sources)
+            source = self._source(sensed, self.observe)
+            now = source, memory, self.sensor.past()
+            (shown,) = self._shows[self.observe].at(worlds, *now)
             fresh = self.take(shown, seats)
         if isinstance(observation, np.ndarray):
             observation[worlds] = fresh

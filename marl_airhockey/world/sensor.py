@@ -16,7 +16,8 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
 from marl_airhockey.world.calibration import CalibrationMap
-from marl_airhockey.world.delay import ALL, Delay, Rows
+from marl_airhockey.world.delay import ALL, Rows, WayDelay
+from marl_airhockey.world.estimator import Estimator
 from marl_airhockey.world.occlusion import Occlusion
 
 SENSED = (
@@ -57,13 +58,14 @@ class Sensor:
         things = (num_worlds, count, 2)
         longest = physics.highest("observation_delay")
         longest += physics.highest("observation_jitter")
-        self.delay = Delay(longest, control_dt, things)
+        self.delay = WayDelay(longest, control_dt, things[:2])
         self._extent = np.abs(np.asarray(scene.table.vertices)).max(0)
         self._map = CalibrationMap(num_worlds, 2 * self._extent[1])
         self._maps = physics.any_of("calibration_error")
         self._occlusion = Occlusion(scene, num_worlds, control_dt)
         self._hides = physics.any_of("occlusion")
         self._errs = physics.any_of("false_detection")
+        self._estimator = Estimator(scene, num_worlds, physics, control_dt)
         self._position, self._speed = np.zeros(things), np.zeros(things)
         self._taken = np.zeros((num_worlds, count))
         """Time at which the frame was taken in which a body was seen last, s"""
@@ -76,10 +78,23 @@ class Sensor:
         """(B, PENDING, seats, 2) last actions asked for, in ego frames, newest last."""
         self.keeps_history = False
         """True if these three are kept, as an observation needs them."""
+        self.estimates = False
+        """True if pucks are estimated, as an observation needs it."""
 
     def past(self, rows: Rows = ALL) -> dict[str, Array]:
         """Return ``history`` and ``asked`` of some worlds, by name."""
         return {"history": self.history[rows], "asked": self.asked[rows]}
+
+    def estimated(self, sensed: State, rows: Rows = ALL) -> State:
+        """Return a sensed state of some worlds with pucks as they are estimated now."""
+        if self.ideal:
+            return sensed
+        found, puck = self._estimator.now[rows], sensed.bodies.puck
+        position, velocity = sensed.position.copy(), sensed.velocity.copy()
+        spin = sensed.spin.copy()
+        position[:, puck], velocity[:, puck] = found[..., :2], found[..., 2:4]
+        spin[:, puck] = found[..., 4] / sensed.bodies.radius[puck.start]
+        return replace(sensed, position=position, velocity=velocity, spin=spin)
 
     def note(self, actions: Array) -> None:
         """Take note of the actions (B, seats, 2) that are asked for in a step."""
@@ -109,9 +124,8 @@ class Sensor:
         """
         if not self.ideal:
             position = state.position[worlds, self.camera]
-            velocity = state.velocity[worlds, self.camera]
-            ago = np.arange(self.delay.depth, 0, -1)[:, None, None] * self.control_dt
-            self.delay.fill(worlds, position[:, None] - velocity[:, None] * ago)
+            velocity, dt = state.velocity[worlds, self.camera], self.control_dt
+            self.delay.fill(worlds, _past(position, velocity, self.delay.depth, dt))
             age = values["observation_delay"][worlds] + self.control_dt
             place = position - velocity * age[:, None, None]
             self._position[worlds] = self._map.shifted(place, worlds)
@@ -119,6 +133,15 @@ class Sensor:
             self._taken[worlds] = (state.time[worlds] - age)[:, None]
             self._visible[worlds] = True
             self._occlusion.reset(worlds)
+            if self.estimates:
+                pucks = slice(0, self.pucks)
+                self._estimator.reset(
+                    worlds,
+                    self._position[worlds, pucks],
+                    velocity[:, pucks],
+                    self._taken[worlds, pucks],
+                    state.paddle[worlds],
+                )
         sensed = self.sense(state, values, streams, worlds)
         if self.keeps_history:
             self.history[worlds] = self.history[worlds][:, -1:]
@@ -167,7 +190,8 @@ class Sensor:
         """Update the sensed positions and speeds of the bodies in some worlds."""
         age = values["observation_delay"][rows]
         age = age + values["observation_jitter"][rows] * rng.uniform(0.0, 1.0)
-        place = self.delay.push(state.position[rows, self.camera], age, rows)
+        places = state.position[rows, self.camera], state.velocity[rows, self.camera]
+        place = self.delay.place(np.concatenate(places, -1), age, rows)
         seen = self._map.shifted(place, rows) if self._maps else place.copy()
         noise = values["position_noise"][rows][:, None, None]
         seen += noise * rng.normal(*seen.shape[1:])
@@ -193,3 +217,21 @@ class Sensor:
         self._position[rows] = np.where(fresh[..., None], seen, last)
         self._taken[rows] = np.where(fresh, taken, self._taken[rows])
         self._visible[rows] = pucks
+        if self.estimates:
+            puck, worlds = slice(0, self.pucks), np.arange(len(state.time))[rows]
+            found = np.ascontiguousarray(seen[:, puck])
+            self._estimator.update(
+                worlds,
+                found,
+                taken[:, 0],
+                np.ascontiguousarray(fresh[:, puck]),
+                state.paddle[rows],
+                state.time[rows],
+            )
+
+
+def _past(position: Array, velocity: Array, steps: int, control_dt: float) -> Array:
+    """Return motions (W, steps, n, 4) that led to (W, n, 2) straight, without it."""
+    ago = np.arange(steps, 0, -1)[:, None, None] * control_dt
+    place = position[:, None] - velocity[:, None] * ago
+    return np.concatenate([place, np.broadcast_to(velocity[:, None], place.shape)], -1)

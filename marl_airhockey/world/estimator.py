@@ -1,0 +1,295 @@
+"""Estimator: where pucks are now, and how they move, from what a camera saw.
+
+A Kalman filter with the laws of the table in it: a puck is predicted under drag, slope,
+banks and the hits of paddles, whose ways are known, and corrected by every frame. What
+is shown is the prediction for now, so that delay, noise and short occlusions are made
+up for as far as the table is known.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from marl_airhockey.core.laws import fly, impulse, wall_restitution
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.table import GRAVITY
+from marl_airhockey.types import Array
+
+STEP = 0.01
+"""Longest step of a prediction, s"""
+PAST = 8
+"""Control steps for which the ways of paddles are kept"""
+DRIFT = 0.1
+"""Acceleration that the laws do not tell, m/s2: slopes, and tilts as they differ"""
+BANK, HIT = 0.12, 0.15
+"""What a bank and a hit leave unknown, as shares of the closing speed"""
+FIRST = 0.02
+"""Unknown part of a first velocity, m/s"""
+ABRUPT = 2.5
+"""Change of a velocity beyond which one frame alone is not believed, m/s"""
+STRANGE = 9.0
+"""Squared error, in variances of the prediction, above which something unseen must have
+changed the velocity"""
+
+LAWS = (
+    *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
+    *("wall_friction", "paddle_restitution", "paddle_friction"),
+)
+"""Names of the parameters that predictions use besides the slopes."""
+
+
+class Surroundings(NamedTuple):
+    """What predictions know of a table."""
+
+    laws: Array
+    """(9,) pulls along x and y, m/s2, and `LAWS`: the middle of each range"""
+    normals: Array
+    """(sides, 2) inward"""
+    offsets: Array
+    """(sides,) distances from the origin, m"""
+    radius: float
+    """Radius of a puck, m"""
+    near: float
+    """Distance of the centres of a puck and a paddle that touch, m"""
+    noise: float
+    """Variance of a seen position, m2"""
+    control_dt: float
+    """s"""
+
+
+class Estimator:
+    """Estimator of the pucks of B worlds.
+
+    Args:
+        scene: table and bodies.
+        worlds: B.
+        physics: tells the middle of each parameter's range, and the noise.
+        control_dt: s.
+    """
+
+    def __init__(
+        self, scene: Scene, worlds: int, physics: Physics, control_dt: float
+    ) -> None:
+        middle = {name: sum(pair) / 2 for name, pair in physics.ranges.items()}
+        tilts = np.radians([middle["tilt"], middle["cross_tilt"]])
+        table, bodies = scene.table, scene.bodies
+        # Of the map, only its change within some frames disturbs a velocity.
+        noise = middle["position_noise"] ** 2 + (middle["calibration_error"] / 3) ** 2
+        self._known = Surroundings(
+            np.array([*(-GRAVITY * np.sin(tilts)), *(middle[name] for name in LAWS)]),
+            table.normals,
+            table.offsets,
+            table.puck_radius,
+            table.puck_radius + table.paddle_radius,
+            max(noise, 1e-8),
+            control_dt,
+        )
+        shape = worlds, bodies.pucks
+        self._mean, self._spread = np.zeros((*shape, 5)), np.zeros((*shape, 3))
+        """At the last frame: x, y, vx, vy, speed of the edge; variances of a place and
+        of a velocity along either axis, between them their covariance"""
+        self._taken, self._doubted = np.zeros(shape), np.zeros(shape, np.bool_)
+        self._paddles = np.zeros((worlds, PAST, bodies.paddles, 2))
+        self.now = np.zeros((*shape, 5))
+        """(B, pucks, 5) x, y, m, vx, vy, speed of the edge, m/s, estimated for now"""
+        self.doubt = np.zeros(shape)
+        """(B, pucks) standard deviation of a velocity along an axis, m/s"""
+
+    def reset(
+        self, worlds: Array, seen: Array, velocity: Array, taken: Array, paddles: Array
+    ) -> None:
+        """Begin with pucks (W, pucks, 2) seen at ``taken`` (W, pucks), and paddles."""
+        self._mean[worlds] = 0.0
+        self._mean[worlds, :, :2], self._mean[worlds, :, 2:4] = seen, velocity
+        self._spread[worlds] = self._known.noise, 0.0, FIRST**2
+        self._taken[worlds], self._doubted[worlds] = taken, False
+        self._paddles[worlds] = paddles[:, None]
+
+    def update(
+        self,
+        worlds: Array,
+        seen: Array,
+        taken: Array,
+        fresh: Array,
+        paddles: Array,
+        now: Array,
+    ) -> None:
+        """Correct the estimates of some worlds by a frame; predict them for now.
+
+        Args:
+            worlds: (W,) indices.
+            seen: (W, pucks, 2) places in the frame, m.
+            taken: (W,) time of the frame, s.
+            fresh: (W, pucks) bool, False where a puck is not seen in a new frame.
+            paddles: (W, S, 2) places now, m.
+            now: (W,) s.
+        """
+        past = self._paddles[worlds]
+        past[:, :-1], past[:, -1] = past[:, 1:].copy(), paddles
+        self._paddles[worlds] = past
+        _update(
+            *(worlds, seen, taken, fresh, past, now, self._known),
+            *(self._mean, self._spread, self._taken, self._doubted),
+            *(self.now, self.doubt),
+        )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _update(
+    worlds: Array,
+    seen: Array,
+    taken: Array,
+    fresh: Array,
+    paddles: Array,
+    now: Array,
+    known: Surroundings,
+    mean: Array,
+    spread: Array,
+    last: Array,
+    doubted: Array,
+    shown: Array,
+    doubt: Array,
+) -> None:
+    """Update all arrays of an `Estimator` from ``mean`` on; see `Estimator.update`."""
+    ahead, wide = np.empty(5), np.empty(3)
+    for row in range(len(worlds)):
+        w = worlds[row]
+        for p in range(mean.shape[1]):
+            if fresh[row, p]:
+                ahead[:], wide[:] = mean[w, p], spread[w, p]
+                since = taken[row] - last[w, p]
+                _predict(ahead, wide, last[w, p], since, paddles[row], now[row], known)
+                doubted[w, p] = _correct(
+                    ahead, wide, seen[row, p], since, doubted[w, p], known.noise
+                )
+                if not doubted[w, p]:
+                    mean[w, p], spread[w, p], last[w, p] = ahead, wide, taken[row]
+            ahead[:], wide[:] = mean[w, p], spread[w, p]
+            since = now[row] - last[w, p]
+            _predict(ahead, wide, last[w, p], since, paddles[row], now[row], known)
+            shown[w, p], doubt[w, p] = ahead, np.sqrt(wide[2])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _correct(
+    mean: Array, spread: Array, seen: Array, since: float, doubted: bool, noise: float
+) -> bool:
+    """Correct a prediction by a seen place; return True if that is not believed."""
+    dx, dy = seen[0] - mean[0], seen[1] - mean[1]
+    off = dx * dx + dy * dy
+    if off > (ABRUPT * since) ** 2 and not doubted:
+        return True
+    if off > 2.0 * STRANGE * (spread[0] + noise):
+        # As if the velocity had changed some time after the last frame.
+        change = off / (since * since)
+        spread[2] += change
+        spread[1] += change * since
+        spread[0] += off
+    gain, turn = spread[0] / (spread[0] + noise), spread[1] / (spread[0] + noise)
+    mean[0] += gain * dx
+    mean[1] += gain * dy
+    mean[2] += turn * dx
+    mean[3] += turn * dy
+    spread[2] -= turn * spread[1]
+    spread[1] -= turn * spread[0]
+    spread[0] -= gain * spread[0]
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _predict(
+    mean: Array,
+    spread: Array,
+    begin: float,
+    seconds: float,
+    paddles: Array,
+    now: float,
+    known: Surroundings,
+) -> None:
+    """Move an estimate on by some seconds, in place.
+
+    Args:
+        mean: (5,) x, y, vx, vy, speed of the edge.
+        spread: (3,) variances and covariance.
+        begin: time of the estimate, s.
+        seconds: s.
+        paddles: (PAST, S, 2) places at control steps, the last now.
+        now: s.
+        known: of the table.
+    """
+    laws, steps = known.laws, int(np.ceil(seconds / STEP))
+    h = seconds / max(steps, 1)
+    for k in range(steps):
+        dx, dy, mean[2], mean[3] = fly(
+            mean[2], mean[3], h, laws[0], laws[1], laws[2], laws[3]
+        )
+        mean[0] += dx
+        mean[1] += dy
+        spread[0] += h * (2.0 * spread[1] + h * spread[2])
+        spread[1] += h * spread[2]
+        spread[2] += (DRIFT * h) ** 2
+        for side in range(len(known.offsets)):
+            nx, ny = known.normals[side]
+            beyond = known.offsets[side] + nx * mean[0] + ny * mean[1] - known.radius
+            closing = -(nx * mean[2] + ny * mean[3])
+            if beyond < 0.0 and closing > 0.0:
+                e = wall_restitution(closing, laws[4], laws[5])
+                _bounce(mean, nx, ny, closing, 0.0, e, laws[6])
+                # What was flown beyond the wall comes back at another speed.
+                mean[0] -= (1.0 + e) * beyond * nx
+                mean[1] -= (1.0 + e) * beyond * ny
+                spread[2] += (BANK * closing) ** 2
+        back = (now - begin - (k + 1) * h) / known.control_dt
+        _meet(mean, spread, paddles, back, known)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _meet(
+    mean: Array, spread: Array, paddles: Array, back: float, known: Surroundings
+) -> None:
+    """Let a puck meet the paddles as they were ``back`` control steps ago."""
+    last = len(paddles) - 1
+    new = max(last - int(back), 1)
+    share = min(max(last - back - (new - 1), 0.0), 1.0)
+    for s in range(paddles.shape[1]):
+        wx = paddles[new, s, 0] - paddles[new - 1, s, 0]
+        wy = paddles[new, s, 1] - paddles[new - 1, s, 1]
+        gx = mean[0] - paddles[new - 1, s, 0] - share * wx
+        gy = mean[1] - paddles[new - 1, s, 1] - share * wy
+        gap = np.sqrt(gx * gx + gy * gy)
+        if gap >= known.near or gap == 0.0:
+            continue
+        nx, ny = gx / gap, gy / gap
+        wx, wy = wx / known.control_dt, wy / known.control_dt
+        closing = nx * (wx - mean[2]) + ny * (wy - mean[3])
+        # What was flown into the paddle comes back, too.
+        back_out = known.near - gap
+        if closing > 0.0:
+            along = nx * wy - ny * wx
+            _bounce(mean, nx, ny, closing, along, known.laws[7], known.laws[8])
+            spread[2] += (HIT * closing) ** 2
+            back_out *= 1.0 + known.laws[7]
+        mean[0] += back_out * nx
+        mean[1] += back_out * ny
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _bounce(
+    mean: Array,
+    nx: float,
+    ny: float,
+    closing: float,
+    along: float,
+    restitution: float,
+    friction: float,
+) -> None:
+    """Let a puck bounce off something that moves ``along`` its tangent, m/s."""
+    slip = nx * mean[3] - ny * mean[2] - along - mean[4]
+    push, aside = impulse(closing, slip, restitution, friction, 1.0, 3.0)
+    mean[2] += push * nx - aside * ny
+    mean[3] += push * ny + aside * nx
+    mean[4] -= 2.0 * aside
