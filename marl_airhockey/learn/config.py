@@ -238,7 +238,7 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
         if name not in known:
             raise ValueError(unknown_name("setting", name, known))
     merged = {**presets["defaults"], **presets.get(game.name, {})}
-    sensed = {"observe": "history", **merged.pop("sensed", {})}
+    sensed = {"observe": "estimate", **merged.pop("sensed", {})}
     merged |= sensed if (changes or {}).get("profile", "ideal") != "ideal" else {}
     merged |= changes or {}
     form = merged.get("observe", "velocity"), merged.get("options", {})

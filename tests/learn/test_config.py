@@ -22,7 +22,7 @@ def test_presets_are_whole_and_bad_settings_are_named(scenario):
 def test_a_configuration_survives_its_file(tmp_path):
     changes = {"options": {"pucks": 2}, "profile": "ur5e", "hidden": [32]}
     config = preset("juggle", changes)
-    assert config.observe == "history"
+    assert config.observe == "estimate"
     path = tmp_path / "config.toml"
     path.write_text(config.to_toml())
     assert load_config(path) == config
