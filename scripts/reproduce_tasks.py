@@ -206,6 +206,8 @@ def main(
                 folder = out / "-".join([*filter(None, run), recipe(config)])
                 futures.append(pool.submit(train_seed, config, variant, folder))
         for future in as_completed(futures):
+            if future.exception() is not None:
+                pool.shutdown(cancel_futures=True)
             row, curve = future.result()
             keep(DATA / "tasks.csv", [row])
             keep(DATA / "curves.csv", curve)

@@ -53,7 +53,7 @@ class Sensor:
         self.control_dt = control_dt
         self.camera = slice(scene.bodies.paddles, scene.bodies.movers)
         """Bodies that the camera sees."""
-        self.pucks = scene.bodies.pucks
+        self.pucks, self._puck_radius = scene.bodies.pucks, scene.table.puck_radius
         count = self.camera.stop - self.camera.start
         things = (num_worlds, count, 2)
         longest = physics.highest("observation_delay")
@@ -93,7 +93,7 @@ class Sensor:
         position, velocity = sensed.position.copy(), sensed.velocity.copy()
         spin = sensed.spin.copy()
         position[:, puck], velocity[:, puck] = found[..., :2], found[..., 2:4]
-        spin[:, puck] = found[..., 4] / sensed.bodies.radius[puck.start]
+        spin[:, puck] = found[..., 4] / self._puck_radius
         return replace(sensed, position=position, velocity=velocity, spin=spin)
 
     def note(self, actions: Array) -> None:

@@ -160,3 +160,12 @@ def test_in_the_ideal_profile_it_is_the_truth():
     world.reset(0)
     estimate, truth = step(world)
     np.testing.assert_array_equal(estimate, truth)
+
+
+def test_every_scenario_shows_estimates(scenario):
+    world = ah.make_world(scenario, 2, profile="ur5e", observe="estimate")
+    world.reset(0)
+    for _ in range(3):
+        result = world.step(np.zeros((2, len(world.open), 2)))
+    assert result.observation.shape[-1] == len(world.observer.labels)
+    assert np.isfinite(result.observation).all()
