@@ -206,7 +206,7 @@ def main(
                 folder = out / "-".join([*filter(None, run), recipe(config)])
                 futures.append(pool.submit(train_seed, config, variant, folder))
         for future in as_completed(futures):
-            if future.exception() is not None:
+            if future.exception() is not None:  # Do not wait for all the others.
                 pool.shutdown(cancel_futures=True)
             row, curve = future.result()
             keep(DATA / "tasks.csv", [row])

@@ -21,8 +21,8 @@ from marl_airhockey.types import Array
 
 STEP = 0.01
 """Longest step of a prediction, s"""
-PAST = 8
-"""Control steps for which the ways of paddles are kept"""
+PAST = 0.4
+"""Time for which the ways of paddles are kept, s"""
 DRIFT = 0.5
 """Acceleration that the laws do not tell, m/s2: slopes, tilts as they differ, and a map
 that changes with place. Like the next two it was chosen for the least errors in juggle
@@ -95,7 +95,8 @@ class Estimator:
         """At the last frame: x, y, vx, vy, speed of the edge; variances of a place and
         of a velocity along either axis, between them their covariance"""
         self._taken, self._doubted = np.zeros(shape), np.zeros(shape, np.bool_)
-        self._paddles = np.zeros((worlds, PAST, bodies.paddles, 2))
+        kept = max(round(PAST / control_dt), 2)
+        self._paddles = np.zeros((worlds, kept, bodies.paddles, 2))
         self.now = np.zeros((*shape, 5))
         """(B, pucks, 5) x, y, m, vx, vy, speed of the edge, m/s, estimated for now"""
         self.doubt = np.zeros(shape)
@@ -219,7 +220,7 @@ def _predict(
         spread: (3,) variances and covariance.
         begin: time of the estimate, s.
         seconds: s.
-        paddles: (PAST, S, 2) places at control steps, the last now.
+        paddles: (n, S, 2) places at control steps, the last now.
         now: s.
         known: of the table.
     """
