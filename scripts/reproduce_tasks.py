@@ -212,56 +212,62 @@ def main(
             keep(DATA / "tasks.csv", [row])
             keep(DATA / "curves.csv", curve)
             console.print(row)
-    shown = (profile, variant)
-    rows, points = (
-        [r for r in read(DATA / name) if (r["profile"], r["variant"]) == shown]
-        for name in ("tasks.csv", "curves.csv")
-    )
-    lines = [
-        line(name, found, config_of(name, profile, variant, 0))
-        for name in names
-        if (found := [row for row in rows if row["task"] == name])
-    ]
-    table = Table(*HEADERS, title=f"{profile} profile {variant}, {EPISODES} episodes")
-    for cells in lines:
-        table.add_row(*cells)
+    rows = [row for row in read(DATA / "tasks.csv") if row["profile"] == profile]
+    others = sorted({row["variant"] for row in rows} - {variant}) if not variant else []
+    headers = (*HEADERS, *others)
+    table = Table(*headers, title=f"{profile} profile {variant}, {EPISODES} episodes")
+    lines = []
+    for name in names:
+        found = [of_variant(rows, name, v) for v in (variant, *others)]
+        if found[0]:
+            beside = (f"{mean(r, 'success'):.3f}" if r else "-" for r in found[1:])
+            keywords = config_of(name, profile, variant, 0).keywords
+            lines.append((*line(name, found[0], floors(name, keywords)), *beside))
+            table.add_row(*lines[-1])
     console.print(table)
     if markdown is not None:
-        ruled = [HEADERS, ("---",) * len(HEADERS), *lines]
+        ruled = [headers, ("---",) * len(headers), *lines]
         text = "".join(f"| {' | '.join(cells)} |\n" for cells in ruled)
         markdown.write_text(text)
     if curves is not None:
-        plot_seed_curves({n: runs_of(points, n) for n in names}, curves)
+        points = [p for p in read(DATA / "curves.csv") if p["profile"] == profile]
+        plot_seed_curves({n: runs_of(points, n, variant) for n in names}, curves)
 
 
-def runs_of(points: Rows, task: str) -> list[Rows]:
-    """Return the curves of a task, one for each seed."""
-    mine = [point for point in points if point["task"] == task]
+def of_variant(rows: Rows, task: str, variant: str) -> Rows:
+    """Return the rows of a task in a variant."""
+    return [r for r in rows if (r["task"], r["variant"]) == (task, variant)]
+
+
+def runs_of(points: Rows, task: str, variant: str) -> list[Rows]:
+    """Return the curves of a task in a variant, one for each seed."""
+    mine = of_variant(points, task, variant)
     seeds = sorted({point["seed"] for point in mine})
     return [[p for p in mine if p["seed"] == seed] for seed in seeds]
 
 
-def line(name: str, rows: Rows, config: TrainConfig) -> tuple[str, ...]:
-    """Return the cells of a task: means over its seeds, and the floors."""
+def mean(rows: Rows, column: str) -> float:
+    """Return the mean of a column."""
+    return float(np.mean([float(row[column]) for row in rows]))
 
-    def mean(key: str) -> float:
-        return float(np.mean([float(row[key]) for row in rows]))
+
+def line(name: str, rows: Rows, floor: dict[str, float]) -> tuple[str, ...]:
+    """Return the cells of a task: means over its seeds, and the floors."""
 
     def seconds_to(level: float) -> str:
         times = [row[f"cpu_seconds_to_{level}"] for row in rows]
         return "-" if "" in times else f"{np.mean([float(t) for t in times]):.0f}"
 
-    low, high = interval(mean("success"), EPISODES * len(rows))
-    floor = floors(name, config.keywords)
+    low, high = interval(mean(rows, "success"), EPISODES * len(rows))
     return (
         name,
-        f"{mean('success'):.3f}",
+        f"{mean(rows, 'success'):.3f}",
         f"{min(float(row['success']) for row in rows):.3f}",
         f"{low:.3f}..{high:.3f}",
-        *(f"{mean(k):.3f}" for k in ("sampled", "first_shot", "pymunk", "arm")),
-        f"{mean('delayed'):.3f}",
-        f"{mean('cpu_minutes'):.1f}",
-        f"{mean('steps') / 1e6:.1f}",
+        *(f"{mean(rows, k):.3f}" for k in ("sampled", "first_shot", "pymunk", "arm")),
+        f"{mean(rows, 'delayed'):.3f}",
+        f"{mean(rows, 'cpu_minutes'):.1f}",
+        f"{mean(rows, 'steps') / 1e6:.1f}",
         " / ".join(seconds_to(level) for level in THRESHOLDS),
         *(f"{floor[k]:.3f}" for k in ("still", "random", "sticky")),
         f"{PAPER[name]:.1f}" if name in PAPER else "-",
