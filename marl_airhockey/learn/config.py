@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.profiles import PROFILES
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, runs_code
 from marl_airhockey.toolkit.policies import RUN_FORMAT, check_run_format
 from marl_airhockey.toolkit.trust import require_trust
@@ -238,13 +239,25 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
         if name not in known:
             raise ValueError(unknown_name("setting", name, known))
     merged = {**presets["defaults"], **presets.get(game.name, {})}
-    sensed = {"observe": "estimate", **merged.pop("sensed", {})}
-    merged |= sensed if (changes or {}).get("profile", "ideal") != "ideal" else {}
+    sensed = merged.pop("sensed", {})
+    profile = (changes or {}).get("profile", "ideal")
+    if profile != "ideal":
+        merged |= {"observe": "estimate", "physics": _lags(profile), **sensed}
     merged |= changes or {}
     form = merged.get("observe", "velocity"), merged.get("options", {})
     if TrainConfig.needs_sb3(*form):
         merged = {"engine": "sb3", **merged}
     return TrainConfig(**{**merged, "scenario": scenario})
+
+
+def _lags(profile: str) -> dict[str, Any]:
+    """Return a servo's lag from none to the profile's longest.
+
+    So a policy plays on arms that lag less as well, the simulated one among them.
+    """
+    if profile not in PROFILES:
+        raise ValueError(unknown_name("profile", profile, PROFILES))
+    return {"servo_time": [0.0, PROFILES[profile].ranges["servo_time"][1]]}
 
 
 def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
