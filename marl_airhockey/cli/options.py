@@ -32,7 +32,7 @@ console = Console()
 Scenario = Annotated[
     str | None,
     typer.Option(
-        "--scenario", "-s", help="What is played; None: what it was trained in."
+        "--scenario", "-s", help="What is played; None: the scenario of its training."
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
