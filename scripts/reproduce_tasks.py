@@ -96,7 +96,7 @@ def recipe(config: TrainConfig) -> str:
     settings = {
         name: value
         for name, value in dataclasses.asdict(config).items()
-        if name != "seed" and value != usual[name]
+        if name != "seed" and value not in ({}, usual[name])
     }
     return hashlib.sha256(repr(settings).encode()).hexdigest()[:8]
 
@@ -112,7 +112,7 @@ def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Ro
     train(None if (folder / "config.toml").exists() else config, folder)
     values = config.scenario, config.profile, variant, config.seed
     key = dict(zip(KEY, values, strict=True))
-    row: Row = {**key, "recipe": recipe(config), **measure(config, variant, folder)}
+    row: Row = {**key, "recipe": recipe(config), **measure(config, folder)}
     curve = read(folder / "evaluations.csv")
     row["cpu_minutes"] = round(float(curve[-1]["cpu_seconds"]) / 60, 2)
     row["steps"] = int(curve[-1]["steps"])
@@ -123,12 +123,12 @@ def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Ro
     return row, [{**key, **point} for point in points]
 
 
-def measure(config: TrainConfig, variant: str, folder: Path) -> Row:
+def measure(config: TrainConfig, folder: Path) -> Row:
     """Return the success of a run's last policy in all cases, by the column's name."""
-    usual = keywords_of(config, variant)
+    usual = config.keywords
     late: Keywords = {
         **usual,
-        "physics": {**physics_of(variant), "action_delay": config.control_dt},
+        "physics": {**config.physics, "action_delay": config.control_dt},
     }
     cases: dict[str, tuple[bool, int, Keywords]] = {
         "success": (True, EPISODES, usual),
@@ -145,16 +145,6 @@ def measure(config: TrainConfig, variant: str, folder: Path) -> Row:
         if name == "success":
             row["first_shot"] = round(found.first_shot, 4)
     return row
-
-
-def keywords_of(config: TrainConfig, variant: str) -> Keywords:
-    """Return the keywords of evaluations: the profile as it is, not its training's."""
-    return {**config.keywords, "physics": physics_of(variant)}
-
-
-def physics_of(variant: str) -> dict[str, float]:
-    """Return what a variant changes of a profile's physics."""
-    return dict(VARIANTS[variant].get("physics", {}))
 
 
 def read(path: Path) -> Rows:
@@ -231,7 +221,7 @@ def main(
         found = [of_variant(rows, name, v) for v in (variant, *others)]
         if found[0]:
             beside = (f"{mean(r, 'success'):.3f}" if r else "-" for r in found[1:])
-            keywords = keywords_of(config_of(name, profile, variant, 0), variant)
+            keywords = config_of(name, profile, variant, 0).keywords
             lines.append((*line(name, found[0], floors(name, keywords)), *beside))
             table.add_row(*lines[-1])
     console.print(table)

@@ -56,6 +56,8 @@ class TrainConfig:
     """Drivers of seats that are not learned, by agent"""
     physics: dict[str, Any] = field(default_factory=dict)
     """Physical parameters, by name: numbers or ranges"""
+    training_physics: dict[str, Any] = field(default_factory=dict)
+    """The same for training alone, not for evaluations; `physics` comes first"""
     control_dt: float = 0.05
     """s between two actions; `gamma` is of one of them"""
     engine: str = "torch"
@@ -180,7 +182,7 @@ class TrainConfig:
 
     @property
     def keywords(self) -> Keywords:
-        """Keywords of the environments."""
+        """Keywords of the environments of evaluations."""
         return {
             "backend": self.backend,
             "profile": self.profile,
@@ -190,6 +192,12 @@ class TrainConfig:
             "physics": self.physics,
             "control_dt": self.control_dt,
         }
+
+    @property
+    def training_keywords(self) -> Keywords:
+        """Keywords of the environments of training."""
+        physics = {**self.training_physics, **self.physics}
+        return {**self.keywords, "physics": physics}
 
     def to_toml(self) -> str:
         """Return the configuration as TOML, readable by `load_config`."""
@@ -242,7 +250,8 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     sensed = merged.pop("sensed", {})
     profile = (changes or {}).get("profile", "ideal")
     if profile != "ideal":
-        merged |= {"observe": "estimate", "physics": _lags(profile), **sensed}
+        lags = _lags(profile)
+        merged |= {"observe": "estimate", "training_physics": lags, **sensed}
     merged |= changes or {}
     form = merged.get("observe", "velocity"), merged.get("options", {})
     if TrainConfig.needs_sb3(*form):

@@ -68,7 +68,7 @@ def start_clock(run: TrainingRun) -> None:
     Arms are slow to build and compile next to nothing, so they are left alone.
     """
     if find_backend(run.config.backend).ideal:
-        compile_world(run.config.scenario, run.config.keywords)
+        compile_world(run.config.scenario, run.config.training_keywords)
     run.start_clock()
 
 

@@ -194,11 +194,11 @@ def make_training_env(
         pool: folder of the snapshots of self-play.
     """
     if not config.self_play:
-        return make_sb3_vec(config.scenario, num_worlds, **config.keywords)
+        return make_sb3_vec(config.scenario, num_worlds, **config.training_keywords)
     return SelfPlayVecEnv(
         config.scenario,
         num_worlds,
-        config.keywords,
+        config.training_keywords,
         scripts=config.opponents,
         mirror=config.mirror,
         script_share=config.script_share,

@@ -29,3 +29,17 @@ def test_a_configuration_survives_its_file(tmp_path):
     path.write_text("nothing = 1")
     with pytest.raises(ValueError, match="no training configuration"):
         load_config(path)
+
+
+def test_policies_for_robots_learn_with_faster_servos_than_they_are_measured_with():
+    config = preset("juggle", {"profile": "ur5e", "physics": {"puck_drag": 0.02}})
+    assert config.training_keywords["physics"] == {
+        "servo_time": [0.0, 0.1],
+        "puck_drag": 0.02,
+    }
+    assert config.keywords["physics"] == {"puck_drag": 0.02}
+    given = preset("juggle", {"profile": "ur5e", "physics": {"servo_time": 0.07}})
+    assert given.training_keywords["physics"] == {"servo_time": 0.07}
+    assert preset("juggle").training_keywords == preset("juggle").keywords
+    with pytest.raises(ValueError, match="unknown profile 'robot'"):
+        preset("juggle", {"profile": "robot"})
