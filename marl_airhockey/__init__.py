@@ -2,6 +2,8 @@
 
 import sys
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 _here = Path(__file__).parent
 if not (_here / "scenarios").is_dir():
@@ -49,3 +51,7 @@ __all__ = [
     "scenario_names",
     "train",
 ]
+
+if TYPE_CHECKING:
+    # Type checkers do not ask a finder for `from marl_airhockey import duel_v0`.
+    def __getattr__(name: str) -> ModuleType: ...
