@@ -3,8 +3,8 @@
     python scripts/reproduce_contact.py --steps 2000 --seeds 5
 
 Cases: random actions, full speed in random directions, the zoo's juggling policy, and
-the zoo's duel between two arms, for some seeds and control steps with the robot
-profile's range of physics. Height and tilt are extremes, the force is a mean.
+the zoo's duel between two arms, for some seeds and control steps with the physics of
+the profile ur5e. Height and tilt are extremes, the force is a mean.
 """
 
 from __future__ import annotations
