@@ -83,10 +83,10 @@ class WayDelay(Delay):
         """Take motions (W, bodies, 4) x, y, vx, vy; return places ``delay`` s ago."""
         older, newer, share = self._pushed(motion, delay, rows)
         dt, before, after = self.control_dt, older[..., 2:], newer[..., 2:]
-        turn = before - after
+        change = before - after
         gap = newer[..., :2] - older[..., :2] - after * dt
-        square = (turn * turn).sum(-1, keepdims=True)
-        kink = (gap * turn).sum(-1, keepdims=True) / np.maximum(square, 1e-12)
+        square = (change * change).sum(-1, keepdims=True)
+        kink = (gap * change).sum(-1, keepdims=True) / np.maximum(square, 1e-12)
         since = share * dt
         along = older[..., :2] + before * since
         back = newer[..., :2] - after * (dt - since)

@@ -192,14 +192,14 @@ def _correct(
         spread[2] += change
         spread[1] += change * since
         spread[0] += off
-    gain, turn = spread[0] / (spread[0] + noise), spread[1] / (spread[0] + noise)
-    mean[0] += gain * dx
-    mean[1] += gain * dy
-    mean[2] += turn * dx
-    mean[3] += turn * dy
-    spread[2] -= turn * spread[1]
-    spread[1] -= turn * spread[0]
-    spread[0] -= gain * spread[0]
+    gain_x, gain_v = spread[0] / (spread[0] + noise), spread[1] / (spread[0] + noise)
+    mean[0] += gain_x * dx
+    mean[1] += gain_x * dy
+    mean[2] += gain_v * dx
+    mean[3] += gain_v * dy
+    spread[2] -= gain_v * spread[1]
+    spread[1] -= gain_v * spread[0]
+    spread[0] -= gain_x * spread[0]
     return False
 
 

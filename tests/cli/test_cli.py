@@ -72,7 +72,7 @@ def test_demo_makes_what_it_says(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("list", "jugle"), "unknown scenario 'jugle'"),
+        (("list", "jugle"), "unknown scenario or profile 'jugle'"),
         (("evaluate", "strker", "-s", "juggle"), "unknown driver 'strker'"),
         (("evaluate", "x.zip", "-s", "juggle"), "no such policy file"),
         (("train", "jugle"), "unknown scenario"),
