@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from marl_airhockey.core.parameters import PUCK_SPEED_CAP, SLOWEST_BOUNCE
+from marl_airhockey.types import Array
 
 Motion = tuple[float, float, float, float]
 """Distance along x and y, m, and velocity after it, m/s."""
@@ -135,3 +136,31 @@ def impulse(
     normal = (1.0 + restitution) * speed / normal_mass
     most = friction * normal
     return normal, min(max(-slip / tangential_mass, -most), most)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def bounce(
+    puck: Array,
+    nx: float,
+    ny: float,
+    closing: float,
+    along: float,
+    restitution: float,
+    friction: float,
+) -> None:
+    """Let a puck bounce off something heavy, in place.
+
+    Args:
+        puck: (5,) x, y, m, vx, vy and speed of the edge by spin, m/s.
+        nx: of the unit normal toward the puck.
+        ny: of the same.
+        closing: speed at which they come together along it, m/s, above 0.
+        along: speed of the other along the normal turned by +90 degrees, m/s.
+        restitution: share of the closing speed that is returned.
+        friction: coefficient.
+    """
+    slip = nx * puck[3] - ny * puck[2] - along - puck[4]
+    push, aside = impulse(closing, slip, restitution, friction, 1.0, 3.0)
+    puck[2] += push * nx - aside * ny
+    puck[3] += push * ny + aside * nx
+    puck[4] -= 2.0 * aside

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numba import njit
 
-from marl_airhockey.core.laws import impulse
+from marl_airhockey.core.laws import bounce
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
@@ -139,12 +139,8 @@ def _hit(
         closing = push[w] - nx * vx - ny * vy
         if closing <= 0.0:
             continue
-        met[w], slip = True, nx * vy - ny * vx - puck[w, 4]
-        laws = restitution[w], friction[w]
-        along, aside = impulse(closing, slip, *laws, 1.0, 3.0)
-        puck[w, 2] += along * nx - aside * ny
-        puck[w, 3] += along * ny + aside * nx
-        puck[w, 4] -= 2.0 * aside
+        met[w] = True
+        bounce(puck[w], nx, ny, closing, 0.0, restitution[w], friction[w])
     return met
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from marl_airhockey.core.laws import fly, impulse, wall_restitution
+from marl_airhockey.core.laws import bounce, fly, wall_restitution
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
@@ -99,8 +99,6 @@ class Estimator:
         self._paddles = np.zeros((worlds, kept, bodies.paddles, 2))
         self.now = np.zeros((*shape, 5))
         """(B, pucks, 5) x, y, m, vx, vy, speed of the edge, m/s, estimated for now"""
-        self.doubt = np.zeros(shape)
-        """(B, pucks) standard deviation of a velocity along an axis, m/s"""
 
     def reset(
         self, worlds: Array, seen: Array, velocity: Array, taken: Array, paddles: Array
@@ -137,7 +135,7 @@ class Estimator:
         _update(
             *(worlds, seen, taken, fresh, past, now, self._known),
             *(self._mean, self._spread, self._taken, self._doubted),
-            *(self.now, self.doubt),
+            self.now,
         )
 
 
@@ -155,7 +153,6 @@ def _update(
     last: Array,
     doubted: Array,
     shown: Array,
-    doubt: Array,
 ) -> None:
     """Update all arrays of an `Estimator` from ``mean`` on; see `Estimator.update`."""
     ahead, wide = np.empty(5), np.empty(3)
@@ -174,7 +171,7 @@ def _update(
             ahead[:], wide[:] = mean[w, p], spread[w, p]
             since = now[row] - last[w, p]
             _predict(ahead, wide, last[w, p], since, paddles[row], now[row], known)
-            shown[w, p], doubt[w, p] = ahead, np.sqrt(wide[2])
+            shown[w, p] = ahead
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -241,7 +238,7 @@ def _predict(
             closing = -(nx * mean[2] + ny * mean[3])
             if beyond < 0.0 and closing > 0.0:
                 e = wall_restitution(closing, laws[4], laws[5])
-                _bounce(mean, nx, ny, closing, 0.0, e, laws[6])
+                bounce(mean, nx, ny, closing, 0.0, e, laws[6])
                 # What was flown beyond the wall comes back at another speed.
                 mean[0] -= (1.0 + e) * beyond * nx
                 mean[1] -= (1.0 + e) * beyond * ny
@@ -273,26 +270,8 @@ def _meet(
         back_out = known.near - gap
         if closing > 0.0:
             along = nx * wy - ny * wx
-            _bounce(mean, nx, ny, closing, along, known.laws[7], known.laws[8])
+            bounce(mean, nx, ny, closing, along, known.laws[7], known.laws[8])
             spread[2] += (HIT * closing) ** 2
             back_out *= 1.0 + known.laws[7]
         mean[0] += back_out * nx
         mean[1] += back_out * ny
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _bounce(
-    mean: Array,
-    nx: float,
-    ny: float,
-    closing: float,
-    along: float,
-    restitution: float,
-    friction: float,
-) -> None:
-    """Let a puck bounce off something that moves ``along`` its tangent, m/s."""
-    slip = nx * mean[3] - ny * mean[2] - along - mean[4]
-    push, aside = impulse(closing, slip, restitution, friction, 1.0, 3.0)
-    mean[2] += push * nx - aside * ny
-    mean[3] += push * ny + aside * nx
-    mean[4] -= 2.0 * aside

@@ -196,10 +196,10 @@ class Sensor:
         noise = values["position_noise"][rows][:, None, None]
         seen += noise * rng.normal(*seen.shape[1:])
         visible = np.ones((len(seen), seen.shape[1]), np.bool_)
-        pucks = visible[:, : self.pucks]
+        found = visible[:, : self.pucks]
         if self._hides:
             arms, share = state.paddle[rows], values["occlusion"][rows]
-            pucks[:] = self._occlusion.unhidden(
+            found[:] = self._occlusion.unhidden(
                 place[:, : self.pucks], arms, share, rng, rows
             )
         if self._errs:
@@ -207,7 +207,7 @@ class Sensor:
             wrong = wrong < values["false_detection"][rows][:, None]
             elsewhere = self._extent * rng.uniform(-1.0, 1.0, self.pucks, 2)
             np.copyto(seen[:, : self.pucks], elsewhere, where=wrong[..., None])
-            pucks |= wrong
+            found |= wrong
         taken = (state.time[rows] - age)[:, None]
         since = taken - self._taken[rows]
         fresh = visible & (since > SAME_FRAME)
@@ -216,15 +216,15 @@ class Sensor:
         self._speed[rows] = np.where(fresh[..., None], moved, speed)
         self._position[rows] = np.where(fresh[..., None], seen, last)
         self._taken[rows] = np.where(fresh, taken, self._taken[rows])
-        self._visible[rows] = pucks
+        self._visible[rows] = found
         if self.estimates:
-            puck, worlds = slice(0, self.pucks), np.arange(len(state.time))[rows]
-            found = np.ascontiguousarray(seen[:, puck])
+            # Contiguous with and without blocks, so that one version is compiled.
+            pucks = slice(0, self.pucks)
             self._estimator.update(
-                worlds,
-                found,
+                np.arange(len(state.time))[rows],
+                np.ascontiguousarray(seen[:, pucks]),
                 taken[:, 0],
-                np.ascontiguousarray(fresh[:, puck]),
+                np.ascontiguousarray(fresh[:, pucks]),
                 state.paddle[rows],
                 state.time[rows],
             )

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from situations import place_puck
 
 import marl_airhockey as ah
 from marl_airhockey.core.scatter import draw
@@ -24,11 +25,7 @@ def after(backend, place, velocity, paddle=(-0.65, 0.0), worlds=600, **physics):
     world = ah.make_world("touch", worlds, backend=backend, physics=LEVEL | physics)
     world.autoreset = False
     world.reset(0)
-    state, _ = world.get_state()
-    state.position[:, 0], state.position[:, 1] = paddle, place
-    state.velocity[:, 0], state.velocity[:, 1] = 0.0, velocity
-    state.spin[:] = 0.0
-    world.set_state(state)
+    place_puck(world, *place, *velocity, paddle=paddle)
     for _ in range(3):
         world.step(np.zeros((worlds, 1, 2)))
     return world.state

@@ -3,10 +3,15 @@
 import numpy as np
 
 
-def place_puck(world, x, y, vx=0.0, vy=0.0, **memory):
-    """Put puck 0 of every world somewhere, with something else in the memory."""
+def place_puck(world, x, y, vx=0.0, vy=0.0, paddle=None, **memory):
+    """Put puck 0 of every world somewhere, with something else in the memory.
+
+    If the place of a paddle is given, that of seat 0 stands there and nothing turns.
+    """
     rows, kept = world.get_state()
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (x, y), (vx, vy)
+    if paddle is not None:
+        rows.position[:, 0], rows.velocity[:, 0], rows.spin[:] = paddle, 0.0, 0.0
     for name, value in memory.items():
         kept[name][:] = value
     world.set_state(rows, kept)

@@ -1,16 +1,16 @@
-"""What the estimator makes of a camera's frames, against the truth."""
+"""Estimates of pucks from a camera's frames, against the truth."""
 
 import numpy as np
 import pytest
+from situations import place_puck
 
 import marl_airhockey as ah
 
-DT = 0.05
 LATE = {"observation_delay": 0.04, "observation_jitter": 0.0}
 LEVEL = {"preset": "frictionless", "tilt": 0.0, "wall_restitution": 0.8}
 
 
-def puck_at(place, velocity, worlds=1, paddle=(-0.65, 0.0), **physics):
+def puck_at(place, velocity, worlds=1, **physics):
     """Return worlds with a puck on its way, which the estimator follows."""
     world = ah.make_world(
         "touch",
@@ -20,17 +20,13 @@ def puck_at(place, velocity, worlds=1, paddle=(-0.65, 0.0), **physics):
         max_cycles=999,
     )
     world.reset(0)
-    state, _ = world.get_state()
-    state.position[:, 0], state.position[:, 1] = paddle, place
-    state.velocity[:, 0], state.velocity[:, 1] = 0.0, velocity
-    state.spin[:] = 0.0
-    world.set_state(state)
+    place_puck(world, *place, *velocity, paddle=(-0.65, 0.0))
     return world
 
 
-def step(world, action=(0.0, 0.0)):
+def step(world):
     """Take a step and return the estimated and the true puck, (B, 4) each."""
-    world.step(np.tile(action, (world.num_worlds, 1, 1)))
+    world.step(np.zeros((world.num_worlds, 1, 2)))
     shown = world.sensor.estimated(world.sensed)
     return [
         np.concatenate([s.puck[:, 0], s.puck_velocity[:, 0]], -1)

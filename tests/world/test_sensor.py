@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from situations import place_puck
 
 import marl_airhockey as ah
 from marl_airhockey.core.rng import RandomStreams
@@ -17,11 +18,7 @@ def drifting(worlds, velocity=(0.1, 0.05), **physics):
         "touch", worlds, physics={**LEVEL, **physics}, observe="history", max_cycles=999
     )
     world.reset(0)
-    state, _ = world.get_state()
-    state.position[:, 0], state.position[:, 1] = (-0.65, 0.0), (0.1, -0.1)
-    state.velocity[:, 0], state.velocity[:, 1] = 0.0, velocity
-    state.spin[:] = 0.0
-    world.set_state(state)
+    place_puck(world, 0.1, -0.1, *velocity, paddle=(-0.65, 0.0))
     return world
 
 
