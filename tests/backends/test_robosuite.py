@@ -157,6 +157,35 @@ def test_nothing_escapes():
             assert y < 0.3048
 
 
+def test_a_puck_in_a_corner_does_not_tip_the_paddle():
+    # Pressed on at full speed, from all sides that there are.
+    world = ah.make_world(
+        "duel",
+        6,
+        backend="robosuite",
+        profile="ur5e",
+        options={"seats": "robot"},
+        drivers={"paddle_1": "still"},
+    )
+    world.reset(0)
+    state, memory = world.get_state()
+    rng = np.random.default_rng(0)
+    state.position[:, 0] = (-0.66, -0.15) + 0.03 * rng.uniform(-1.0, 1.0, (6, 2))
+    state.position[:, 2] = -0.79, -0.265
+    world.set_state(state, memory)
+    overlaps = []
+    for _ in range(26):
+        way = world.state.puck[:, 0] - world.state.paddle[:, 0]
+        gap = np.linalg.norm(way, axis=-1)
+        overlaps.append(TABLE.paddle_radius + TABLE.puck_radius - gap)
+        world.step((way / gap[:, None])[:, None])
+        trace = world.backend.trace[:, :, 0]
+        assert np.degrees(trace[..., TILT].max()) < 1.0
+        assert trace[..., JOINT].max() < FASTEST
+    assert np.max(overlaps) > 0.005, "no puck was jammed"
+    world.close()
+
+
 @pytest.mark.parametrize("table", ["standard", "full_size"])
 @pytest.mark.parametrize("tilt", [0.0, 5.5])
 def test_the_robot_seat_is_what_an_arm_can_hold(tilt, table):

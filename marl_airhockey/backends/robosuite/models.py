@@ -23,10 +23,8 @@ THICK = 0.06
 TALL = 0.02
 """Half the height of rails, pucks and blocks (m)."""
 LOW = 0.004
-"""Half the height of a puck's collision shape (m): a higher one that is caught between
-paddle and rail would tip the paddle."""
-IMPEDANCE = "0.99 0.999 0.001 0.5 2"
-"""Impedance (solimp) of contacts with a set restitution."""
+"""Height at which pucks and round blocks touch (m): a puck that is caught higher up
+between paddle and rail would tip the paddle."""
 
 
 @register_gripper
@@ -157,10 +155,10 @@ class AirHockeyArena(Arena):
         body.append(
             new_geom(
                 name,
-                # Two capsules touch in one point, as discs in a plane do.
-                "box" if square else "capsule",
+                # Spheres of one height touch in one point, as discs in a plane do.
+                "box" if square else "sphere",
                 pos=array_to_string([0, 0, LOW - TALL]),
-                size=array_to_string([*size[:-1], LOW]),
+                size=array_to_string([radius, radius, LOW] if square else [radius]),
                 mass="0.03",
                 priority="1" if kind == "block" else "0",
                 **_sliding(SLIDES | RAIL),
@@ -213,4 +211,4 @@ def _collision(bits: int) -> dict[str, str]:
 
 
 def _sliding(bits: int) -> dict[str, str]:
-    return {"condim": "1", "solimp": IMPEDANCE, **_collision(bits)}
+    return {"condim": "1", **_collision(bits)}

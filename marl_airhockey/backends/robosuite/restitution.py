@@ -10,6 +10,10 @@ STIFFNESS = 0.19
 """Root of a contact's stiffness times the time step. In a stiffer one the first step,
 which is partial, counts more: the restitution depends on the time of the contact within
 a step. In a softer one bodies overlap more."""
+IMPEDANCE = 0.5
+"""Impedance d of contacts (solimp). A share 1 - d of each is a spring of its own mass,
+so a puck that a paddle jams against a rail stays soft. With d near 1, MuJoCo pushed the
+arm back as stiffly as the puck: with more than 200 N, which tipped the paddle."""
 PHASES = 32
 """Number of times within a step at which contacts begin."""
 MAX_STEPS = 200
@@ -47,6 +51,11 @@ _SHARES = restitution_of(_RATIOS)
 def solref(restitution: float | Array, timestep: float) -> Array:
     """Return the direct solref (..., 2) of contacts with restitutions (...)."""
     ratio = np.interp(-np.asarray(restitution), -_SHARES, _RATIOS)
+    # MuJoCo divides both by the impedance and applies a share of them. That were the
+    # impedance again, but the inverse mass that it reckons with is a mean over three
+    # axes: two thirds of that of a body which slides along two.
+    applied = IMPEDANCE / (IMPEDANCE + (1.0 - IMPEDANCE) * 2.0 / 3.0)
+    scale = IMPEDANCE / applied
     stiffness = (STIFFNESS / timestep) ** 2
-    damping = -2 * ratio * np.sqrt(stiffness)
-    return np.stack([np.full_like(damping, -stiffness), damping], -1)
+    damping = -2 * ratio * np.sqrt(stiffness) * scale
+    return np.stack([np.full_like(damping, -stiffness * scale), damping], -1)

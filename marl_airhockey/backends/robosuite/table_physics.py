@@ -10,7 +10,7 @@ import numpy as np
 from marl_airhockey.backends._planar.walls import sides
 from marl_airhockey.backends.robosuite.frames import TableFrame
 from marl_airhockey.backends.robosuite.models import RAIL, SLIDES
-from marl_airhockey.backends.robosuite.restitution import solref
+from marl_airhockey.backends.robosuite.restitution import IMPEDANCE, solref
 from marl_airhockey.backends.robosuite.sliding import Sliding, apply_laws
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
@@ -49,6 +49,8 @@ class TablePhysics:
         ]
         for k in (*self._paddles, *self._feet):
             model.geom_size[k, 0] = scene.table.paddle_radius
+        # The same at every depth: the first two numbers.
+        model.geom_solimp[[*self._walls, *self._paddles, *self._sides], :2] = IMPEDANCE
         rails = [(k, n) for k, n in enumerate(geoms) if n.startswith("rail")]
         rails = [(k, n) for k, n in rails if not n.endswith("visual")]
         lines = sides(scene)
