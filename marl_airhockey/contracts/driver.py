@@ -41,6 +41,8 @@ class View:
     """Index of the seat: its paddle in ``state``."""
     scenario_memory: Mapping[str, Array] = field(default_factory=dict)
     """The scenario's memory, (B, *); goals in the table frame."""
+    reaction: float = 0.0
+    """Age of all in ``state`` but the own paddle by the rules of the game, s."""
 
 
 PrescribedMotion = Array

@@ -51,6 +51,8 @@ class ObservationContext:
     scene: Scene
     observe: str
     top_speed: float
+    late: bool = False
+    """True if seats see pucks and other paddles late, by the reaction of the game"""
 
     @cached_property
     def extent(self) -> Array:
@@ -93,7 +95,10 @@ class ObservationContext:
 
 
 class EgoView:
-    """View from every seat of a sensed state and the scenario's memory."""
+    """View from every seat of what it sees, and of its own paddle.
+
+    With a reaction, state, memory and history are those of a moment in the past.
+    """
 
     def __init__(
         self,
@@ -101,6 +106,7 @@ class EgoView:
         memory: Memory,
         history: Array,
         asked: Array,
+        paddle: tuple[Array, Array],
         scope: ObservationContext,
     ) -> None:
         self.state, self.memory, self.scope = state, memory, scope
@@ -108,10 +114,8 @@ class EgoView:
         """(..., HISTORY, pucks, 4) sensed x, y, visible, age (s), newest last"""
         self.asked = asked
         """(..., PENDING, S, 2) actions asked for, ego frames, newest last"""
-        self.own = self._own(state.paddle)
-        """(..., S, 2) each seat's own paddle, m"""
-        self.own_velocity = self._own(state.paddle_velocity)
-        """(..., S, 2) m/s"""
+        self.own, self.own_velocity = (self._own(x) for x in paddle)
+        """(..., S, 2) each seat's own paddle now, m and m/s"""
         self.puck = self.rotate(state.puck)
         """(..., S, pucks, 2) m"""
         self.puck_velocity = self.rotate(state.puck_velocity)
@@ -136,6 +140,12 @@ class EgoView:
             return seats
         rotated: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
         return rotated
+
+    @property
+    def own_then(self) -> tuple[Array, Array]:
+        """(..., S, 2) each seat's own paddle at the moment that it sees, m and m/s."""
+        state = self.state
+        return self._own(state.paddle), self._own(state.paddle_velocity)
 
     def _own(self, vectors: Array) -> Array:
         if self.scope.straight:

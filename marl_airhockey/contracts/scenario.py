@@ -60,6 +60,9 @@ class Scenario(ABC):
     """Cost of a squared change of the commanded velocity, in top speeds."""
     turning_weight: float = 0.0
     """Cost of a sudden change of direction."""
+    reaction: float = 0.0
+    """Time after which seats see what pucks and other paddles did, in whole control
+    steps (s). It comes on top of what sensing takes in the profile."""
 
     seconds: float
     """Length of an episode, s."""
@@ -82,6 +85,8 @@ class Scenario(ABC):
             raise ValueError("seconds: must be above 0")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
             raise ValueError('goals="dict": this scenario has no wanted goal')
+        if self.goals == "dict" and self.reaction:
+            raise ValueError('reaction: with goals="dict" seats see goals at once')
 
     @property
     @abstractmethod

@@ -27,7 +27,8 @@ from marl_airhockey.types import Array
 class OwnPaddle(Observable):
     """Position and velocity of the seat's own paddle, as its robot reports them.
 
-    In an estimate or a history also the last actions, which may still be on their way.
+    In an estimate or a history also the last actions, which may still be on their way;
+    with a reaction also where the paddle was at the moment that is seen of all else.
     """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
@@ -38,14 +39,22 @@ class OwnPaddle(Observable):
             for ago in range(PENDING, 0, -1):
                 names = (f"own.asked[-{ago}].{axis}" for axis in "xy")
                 columns += [Column(name, -1.0, 1.0, 1.0) for name in names]
+        if scope.late:
+            columns += scope.position_columns("own.then", (0.2, 0.2), centre)
+            columns += scope.velocity_columns(
+                "own.then", scope.top_speed, scope.top_speed
+            )
         return columns
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[..., :2] = ego.own
         out[..., 2:4] = ego.own_velocity
+        end = 4
         if ego.scope.observe != "velocity":
-            asked = ego.asked.swapaxes(-2, -3)
-            out[..., 4:] = asked.reshape(*asked.shape[:-2], -1)
+            asked, end = ego.asked.swapaxes(-2, -3), 4 + 2 * PENDING
+            out[..., 4:end] = asked.reshape(*asked.shape[:-2], -1)
+        if ego.scope.late:
+            out[..., end : end + 2], out[..., end + 2 :] = ego.own_then
 
 
 @dataclass(frozen=True)

@@ -82,10 +82,6 @@ class DrivenSeat:
         due, held = cycles[worlds] % self.every == 0, self._held[worlds]
         if not due.any():
             return held
-        if worlds is not ALL:
-            sensed = sensed.map(lambda x: x[worlds])
-            memory = {name: value[worlds] for name, value in memory.items()}
-            physics = {name: value[worlds] for name, value in physics.items()}
         view = self.view(sensed, memory, physics, worlds)
         kept = {name: value[worlds] for name, value in self._memory.items()}
         answer = self.driver.act(view, kept)
@@ -112,26 +108,34 @@ class DrivenSeat:
         physics: dict[str, Array],
         worlds: Rows = ALL,
     ) -> View:
-        """Return the view of the driver in some worlds, rows of these alone."""
+        """Return the view of the driver in some worlds; arrays are of all of them."""
         seats, want = np.array([self.index]), self.driver.observe
         shown = self._observer.read(sensed, memory, seats, want, worlds)
-        ego = sensed
+        state, known = self._observer.seen(sensed, memory)
+        if worlds is not ALL:
+            state = state.map(lambda x: x[worlds])
+            known = {name: value[worlds] for name, value in known.items()}
+        position, velocity = state.position, state.velocity
+        if self._observer.reaction:
+            position, velocity = position.copy(), velocity.copy()
+            position[:, self.index] = sensed.position[worlds, self.index]
+            velocity[:, self.index] = sensed.velocity[worlds, self.index]
         if self._rotation[0, 0] != 1.0:
-            position = sensed.position @ self._rotation.T
-            velocity = sensed.velocity @ self._rotation.T
-            ego = replace(sensed, position=position, velocity=velocity)
+            position = position @ self._rotation.T
+            velocity = velocity @ self._rotation.T
         return View(
             scene=self._observer.scenario.scene,
-            state=ego,
+            state=replace(state, position=position, velocity=velocity),
             observation=(
                 {k: v[:, 0] for k, v in shown.items()}
                 if isinstance(shown, dict)
                 else np.asarray(shown)[:, 0]
             ),
             labels=self._layout.labels,
-            top_speed=physics["paddle_speed"],
+            top_speed=physics["paddle_speed"][worlds],
             reach=np.asarray(self._seat.reach),
             rng=self._streams.of(self._purpose).select(worlds),
             seat=self.index,
-            scenario_memory=memory,
+            scenario_memory=known,
+            reaction=self._observer.reaction,
         )

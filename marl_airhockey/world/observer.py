@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +22,7 @@ from marl_airhockey.jit.fused import Fused, Sink, Source
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.delay import ALL, Rows
 from marl_airhockey.world.layout import ObservationLayout
+from marl_airhockey.world.perception import Parts, Perception
 from marl_airhockey.world.sensor import Sensor
 
 Observation = Array | Mapping[str, Array]
@@ -32,8 +34,11 @@ GOALS = ("achieved_goal", "desired_goal")
 class Observer:
     """Observer of sensed states for all seats, in the form that each of them wants.
 
+    With a reaction, all but a seat's own paddle is shown as it was then; `begin` and
+    `note` must be called with what is sensed.
+
     Args:
-        scenario: lists the observables.
+        scenario: lists the observables, and says how late seats see.
         sensor: keeps the history.
         physics: tells the top speed.
         observe: the form for open seats, see `layout.OBSERVE`.
@@ -44,6 +49,10 @@ class Observer:
     ) -> None:
         self.scenario, self.sensor, self.observe = scenario, sensor, observe
         self._top_speed = physics.highest("paddle_speed")
+        steps = round(scenario.reaction / sensor.control_dt)
+        self._perception = Perception(steps) if steps else None
+        self.reaction = steps * sensor.control_dt
+        """s by which seats see late"""
         self._layouts: dict[str, ObservationLayout] = {}
         self._shows: dict[str, Fused] = {}
         self.prepare(observe)
@@ -56,7 +65,9 @@ class Observer:
         self.sensor.estimates |= observe == "estimate"
         if observe not in self._layouts:
             form = "velocity" if observe == "pixels" else observe
-            scope = ObservationContext(self.scenario.scene, form, self._top_speed)
+            late = self._perception is not None
+            top = self._top_speed
+            scope = ObservationContext(self.scenario.scene, form, top, late)
             apart = self.scenario.goals == "dict"
             observables = tuple(
                 p for p in self.scenario.observation if not (apart and p.goal)
@@ -77,10 +88,56 @@ class Observer:
 
     def compile(self, sensed: State, memory: Memory) -> None:
         """Compile all forms of observations, unless they are, for arrays like these."""
-        history = self.sensor.past()
-        for show in self._shows.values():
+        for form, show in self._shows.items():
             if not show.prepared:
-                show.prepare(vars(sensed), memory, history)
+                show.prepare(*self._sources(sensed, memory, form))
+
+    def begin(self, worlds: Array, sensed: State, memory: Memory) -> None:
+        """Begin with what is sensed in some worlds, by index; arrays are of all."""
+        if self._perception is not None:
+            self._perception.begin(worlds, self._parts(sensed, memory))
+
+    def note(self, sensed: State, memory: Memory) -> None:
+        """Take note of what is sensed after a step."""
+        if self._perception is not None:
+            self._perception.push(self._parts(sensed, memory))
+
+    def _parts(self, sensed: State, memory: Memory) -> Parts:
+        """Return what is seen late."""
+        past = {**self.sensor.past(), "frames": self.sensor.frames}
+        parts = {"state": vars(sensed), "memory": memory, "sensor": past}
+        if self.sensor.estimates:
+            parts["estimate"] = vars(self.sensor.estimated(sensed))
+        return parts
+
+    def seen(
+        self, sensed: State, memory: Memory, form: str = "velocity"
+    ) -> tuple[State, Memory]:
+        """Return the state and the memory of all worlds as seats see them.
+
+        Args:
+            sensed: now.
+            memory: now.
+            form: see `observable.OBSERVE`; "estimate" for estimated pucks.
+        """
+        if self._perception is None:
+            estimate = form == "estimate"
+            return self.sensor.estimated(sensed) if estimate else sensed, memory
+        seen = self._perception.seen
+        state = seen("estimate" if form == "estimate" else "state")
+        return replace(sensed, **state), seen("memory")
+
+    def _sources(
+        self, sensed: State, memory: Memory, form: str
+    ) -> tuple[Source, Source, Source]:
+        """Return the arrays of all worlds from which a form of observations is made."""
+        state, known = self.seen(sensed, memory, form)
+        sensor = self.sensor.past()
+        if self._perception is not None:
+            # The own paddle, and what it was asked for, are known at once.
+            sensor["history"] = self._perception.seen("sensor")["history"]
+            sensor["place"], sensor["motion"] = sensed.paddle, sensed.paddle_velocity
+        return vars(state), known, sensor
 
     def read(
         self,
@@ -93,25 +150,20 @@ class Observer:
         """Return observations of some seats, in their order, freshly allocated.
 
         Args:
-            sensed: the sensed state of W worlds, table frame.
-            memory: the scenario's, of these worlds.
+            sensed: the sensed state of all worlds, table frame.
+            memory: the scenario's, of all worlds.
             seats: (n,) indices of seats.
             observe: the form; None for the open seats'.
-            worlds: which they are, by index.
+            worlds: which of them to show.
         """
         observe = observe or self.observe
         if observe == "pixels":
             return self._pictures(memory, seats, worlds)
         self.prepare(observe)
-        source = self._source(sensed, observe, worlds)
-        (shown,) = self._shows[observe](source, memory, self.sensor.past(worlds))
+        show, sources = self._shows[observe], self._sources(sensed, memory, observe)
+        every = isinstance(worlds, slice)
+        (shown,) = show(*sources) if every else show.at(np.asarray(worlds), *sources)
         return self.take(shown, seats)
-
-    def _source(self, sensed: State, observe: str, worlds: Rows = ALL) -> Source:
-        """Return the arrays of the state that a form of observations shows."""
-        if observe == "estimate":
-            sensed = self.sensor.estimated(sensed, worlds)
-        return vars(sensed)
 
     def blank(self, observe: str | None, rows: int) -> Observation:
         """Return observations of one seat that are all zeros, (rows, ...) each.
@@ -145,7 +197,8 @@ class Observer:
 
         Empty if they need the sensor, a history or pixels (`read` is used then).
         """
-        if self.observe != "velocity" or not self.sensor.ideal:
+        late = self._perception is not None
+        if self.observe != "velocity" or not self.sensor.ideal or late:
             return {}
         return self._flat(self.layout, state, memory, self.sensor.past())
 
@@ -154,7 +207,11 @@ class Observer:
     ) -> Sink:
         """Return the numbers of a layout, and the goals beside it."""
         game = self.scenario
-        ego = EgoView(state, memory, past["history"], past["asked"], layout.scope)
+        paddle = state.paddle, state.paddle_velocity
+        if layout.scope.late:
+            paddle = past["place"], past["motion"]
+        sensed = past["history"], past["asked"]
+        ego = EgoView(state, memory, *sensed, paddle, layout.scope)
         shown = {"flat": layout.read(ego)}
         if game.goals == "dict" and isinstance(game, GoalScenario):
             goals = game.achieved(state, memory), game.desired(memory)
@@ -215,12 +272,10 @@ class Observer:
         """
         fresh: Observation
         if self.observe == "pixels":
-            kept = {name: array[worlds] for name, array in memory.items()}
-            fresh = self._pictures(kept, seats, worlds)
+            fresh = self._pictures(memory, seats, worlds)
         else:
-            source = self._source(sensed, self.observe)
-            now = source, memory, self.sensor.past()
-            (shown,) = self._shows[self.observe].at(worlds, *now)
+            sources = self._sources(sensed, memory, self.observe)
+            (shown,) = self._shows[self.observe].at(worlds, *sources)
             fresh = self.take(shown, seats)
         if isinstance(observation, np.ndarray):
             observation[worlds] = fresh
@@ -229,20 +284,14 @@ class Observer:
                 array[worlds] = fresh[name]
 
     def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
-        from marl_airhockey.world.pixels import small_picture
+        from marl_airhockey.world.pixels import pictures_of
 
-        scene, frames = self.scenario.scene, self.sensor.frames[worlds]
-        shape = (len(frames), len(seats), PIXELS, PIXELS, FRAMES)
-        out = np.empty(shape, np.uint8)
-        for b, world in enumerate(frames):
-            goal = memory["goal"][b] if "goal" in memory else None
-            for row, seat in enumerate(seats):
-                rotation = scene.table.rotation(scene.seats[seat].side)
-                for k in range(FRAMES):
-                    out[b, row, :, :, k] = small_picture(
-                        scene, world[k], goal, rotation, int(seat), PIXELS
-                    )
-        return out
+        frames, goals = self.sensor.frames, memory.get("goal")
+        if self._perception is not None:
+            frames = self._perception.seen("sensor")["frames"]
+        if goals is not None:
+            goals = goals[worlds]
+        return pictures_of(self.scenario.scene, frames[worlds], goals, seats, PIXELS)
 
 
 def duplicate(observation: Observation) -> Observation:

@@ -51,3 +51,26 @@ def small_picture(
         wide = round(radius * scale * 2**SHIFT)
         cv2.circle(image, pixel(position[k]), wide, grey, -1, cv2.LINE_AA, SHIFT)
     return image
+
+
+def pictures_of(
+    scene: Scene, frames: Array, goals: Array | None, seats: Array, size: int
+) -> Array:
+    """Draw what some seats of W worlds see: (W, seats, size, size, F) uint8.
+
+    Args:
+        scene: who is on the table.
+        frames: (W, F, N, 2) sensed positions, table frame, newest last, m.
+        goals: (W, 2) wanted places, or None.
+        seats: (n,) indices of seats.
+        size: pixels.
+    """
+    out = np.empty((len(frames), len(seats), size, size, frames.shape[1]), np.uint8)
+    for b, world in enumerate(frames):
+        goal = None if goals is None else goals[b]
+        for row, seat in enumerate(seats):
+            rotation = scene.table.rotation(scene.seats[seat].side)
+            for k, frame in enumerate(world):
+                picture = small_picture(scene, frame, goal, rotation, int(seat), size)
+                out[b, row, :, :, k] = picture
+    return out

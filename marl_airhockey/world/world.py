@@ -253,6 +253,7 @@ class World:
         self._actions.reset(worlds)
         self.sensor.begin(worlds, self._episode.physics, self._streams)
         self._sense(worlds)
+        self.observer.begin(worlds, self._sensed, self._memory)
         self.observer.compile(self._sensed, self._memory)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
@@ -315,6 +316,7 @@ class World:
             rng = self._streams.of("serve", served)
             self._place(served, *self.scenario.serve(rng, rows, memory))
             self._sense(served)
+        self.observer.note(self._sensed, self._memory)
         now = self._sensed, self._memory, self.open
         shown, observer = moment.verdict.shown, self.observer
         result.observation = observer.after_step(shown, *now, served)
