@@ -33,7 +33,7 @@ class Allround(tactics.Scripted):
         field = tactics.Field.of(view.scene, view.seat)
         aim = tactics.open_goal(view, field)
         strike, due = tactics.attack(view, field, aim, pace, lag)
-        place, motion = tactics.nearest_puck(view, lag)
+        place, motion = tactics.nearest_puck(view, field, lag)
         fast = motion[:, 0] < -self.brave
         can = due < self.patience
         guard = tactics.guard(view, field, self.depth, lag)

@@ -26,7 +26,7 @@ class Skill(NamedTuple):
     pace: float
     """Largest share of the top speed that it commands"""
     lag: float
-    """Age of the pucks that it sees, extrapolated backwards at constant velocity (s)"""
+    """Time by which it reckons pucks later than they are (s)"""
 
 
 STRENGTHS = {
@@ -104,10 +104,22 @@ class Field:
         return Field(edge, half, keep, targets, *laws.values())
 
 
-def nearest_puck(view: View, lag: float) -> tuple[Array, Array]:
-    """Return position and velocity (W, 2) of the puck that is, or will be, nearest."""
-    place = view.state.puck - lag * view.state.puck_velocity
-    motion = view.state.puck_velocity
+def nearest_puck(view: View, field: Field, lag: float) -> tuple[Array, Array]:
+    """Reckon place and velocity (W, 2) of the puck that is, or will be, nearest.
+
+    Pucks are brought forward over the reaction of the game, less ``lag``, along the
+    long walls and past all paddles; a longer lag takes them straight back.
+    """
+    place, motion = view.state.puck, view.state.puck_velocity
+    ahead = view.reaction - lag
+    if ahead > 0.0:
+        shape, laws = place.shape, (field.half, field.restitution, field.friction)
+        time = np.full(shape[0] * shape[1], ahead)
+        moved = _slide_on(place.reshape(-1, 2), motion.reshape(-1, 2), time, *laws)
+        place = moved[:, :2].reshape(shape)
+        motion = moved[:, 2:].reshape(shape)
+    else:
+        place = place + ahead * motion
     which = (place[..., 0] + 0.4 * motion[..., 0]).argmin(-1)
     rows = np.arange(len(which))
     return place[rows, which], motion[rows, which]
@@ -120,10 +132,10 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
         view: view of the seat.
         field: see `Field`.
         depth: distance of the line from the near edge of the reach, m.
-        lag: age of the pucks that are seen, s.
+        lag: time by which pucks are reckoned later than they are, s.
     """
     line = view.reach[:, 0].min() + depth
-    place, motion = nearest_puck(view, lag)
+    place, motion = nearest_puck(view, field, lag)
     due = np.clip((place[:, 0] - line) / np.maximum(-motion[:, 0], 0.3), 0.0, 0.6)
     wide = min(np.abs(view.reach[:, 1]).max(), field.keep)
     due = np.where(motion[:, 0] < 0.0, due, 0.0)
@@ -137,7 +149,7 @@ STEP, HORIZON = 0.05, 1.2
 
 
 @njit(cache=True, error_model="numpy")
-def _place_after(
+def _moved(
     x: float,
     y: float,
     vx: float,
@@ -146,8 +158,12 @@ def _place_after(
     half: float,
     restitution: float,
     friction: float,
-) -> tuple[float, float]:
-    """Return where a puck without spin and drag is after a time, long walls or not."""
+) -> tuple[float, float, float, float]:
+    """Move a puck without spin and drag on by a time, long walls or not.
+
+    Returns:
+        Place, m, and velocity, m/s.
+    """
     for _ in range(4):
         wall = half if vy > 0.0 else -half
         due = max((wall - y) / vy, 0.0) if vy != 0.0 else np.inf
@@ -156,7 +172,7 @@ def _place_after(
         x, y, time = x + vx * due, wall, time - due
         push = impulse(abs(vy), vx, restitution, friction, 1.0, 3.0)[1]
         vx, vy = vx + push, -restitution * vy
-    return x + vx * time, y + vy * time
+    return x + vx * time, y + vy * time, vx, vy
 
 
 @njit(cache=True, error_model="numpy")
@@ -168,11 +184,11 @@ def _slide_on(
     restitution: float,
     friction: float,
 ) -> Array:
-    """Return the positions (W, 2) of pucks after some times (W,), s; m."""
-    out = np.empty_like(place)
+    """Return places and velocities (W, 4) of pucks after some times (W,), s."""
+    out = np.empty((len(place), 4))
     for w in range(len(out)):
         x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
-        out[w] = _place_after(x, y, vx, vy, time[w], half, restitution, friction)
+        out[w] = _moved(x, y, vx, vy, time[w], half, restitution, friction)
     return out
 
 
@@ -201,7 +217,7 @@ def _find_strike(
         due[w] = np.inf
         for moment in np.arange(0.0, HORIZON + 0.5 * STEP, STEP):
             x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
-            x, y = _place_after(x, y, vx, vy, moment, half, restitution, friction)
+            x, y, _, _ = _moved(x, y, vx, vy, moment, half, restitution, friction)
             ox, oy = aim[w, 0] - x, aim[w, 1] - y
             size = max(np.sqrt(ox * ox + oy * oy), 1e-6)
             ox, oy = ox / size, oy / size
@@ -230,14 +246,14 @@ def attack(
         field: see `Field`.
         aim: (W, 2) m.
         pace: largest share of top speed.
-        lag: age of the pucks that are seen, s.
+        lag: time by which pucks are reckoned later than they are, s.
 
     Returns:
         Velocities (W, 2), m/s, and times to the strike (W,), s, infinite where the puck
         cannot be struck.
     """
     own, speed = view.state.paddle[:, view.seat], pace * view.top_speed
-    place, motion = nearest_puck(view, lag)
+    place, motion = nearest_puck(view, field, lag)
     bodies = view.state.bodies
     touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
     low, high = view.reach.min(0), view.reach.max(0)
@@ -267,7 +283,7 @@ def open_goal(view: View, field: Field) -> Array:
     """(W, 2) point in the other goals whose shot passes farthest from paddles, m."""
     if not len(field.targets):
         return np.broadcast_to(np.array([-field.edge, 0.0]), (len(view.rng), 2))
-    place, _ = nearest_puck(view, 0.0)
+    place, _ = nearest_puck(view, field, 0.0)
     others = np.delete(view.state.paddle, view.seat, axis=-2)
     shot = field.targets - place[:, None]
     size = np.maximum(length(shot), 1e-6)[..., None]

@@ -1,0 +1,96 @@
+"""Play duels at several reactions: who wins, how many are drawn, goals a minute.
+
+    python scripts/sweep_reaction.py
+    python scripts/sweep_reaction.py --home zoo/duel --far goalkeeper --reactions 0.017,0.15
+
+A reaction is the time by which seats see pucks and the other paddle late. Without one a
+keeper that reckons ahead stops everything; with one attack pays.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+import marl_airhockey as ah
+from marl_airhockey.evaluation.stats import interval
+
+HOME, FAR = (
+    ["allround", "striker", "allround"],
+    ["goalkeeper", "goalkeeper", "allround"],
+)
+SEED = 5_000_000
+
+
+def play(
+    home: str, far: str, reaction: float, games: int, control_dt: float, width: float
+) -> tuple[str, ...]:
+    """Play whole games of two players; return the last cells of their row.
+
+    Args:
+        home: player at home.
+        far: the other.
+        reaction: s.
+        games: number of games.
+        control_dt: s.
+        width: of the goals, m.
+    """
+    world = ah.make_world(
+        "duel",
+        games,
+        drivers={"paddle_0": home, "paddle_1": far},
+        options={"reaction": reaction, "goal_width": width},
+        control_dt=control_dt,
+    )
+    world.autoreset = False
+    world.reset(SEED)
+    goals, minutes = np.zeros((games, 2)), np.zeros(games)
+    playing = np.ones(games, np.bool_)
+    while playing.any():
+        step = world.step(np.zeros((games, 0, 2)))
+        ended = playing & (step.terminated | step.truncated)
+        goals[ended] = world.memory["goals"][ended]
+        minutes[ended] = world.state.time[ended] / 60.0
+        playing &= ~ended
+    world.close()
+    draws = float((goals[:, 0] == goals[:, 1]).mean())
+    low, high = interval(draws, games)
+    return (
+        f"{(goals[:, 0] > goals[:, 1]).mean() + draws / 2:.2f}",
+        f"{draws:.2f} ({low:.2f}..{high:.2f})",
+        " : ".join(f"{scored:.1f}" for scored in goals.mean(0)),
+        f"{goals.sum() / minutes.sum():.1f}",
+    )
+
+
+def main(
+    reactions: Annotated[str, typer.Option(help="s, comma-separated.")] = (
+        "0,0.05,0.1,0.15,0.2"
+    ),
+    home: Annotated[list[str], typer.Option(help="Player at home, repeatable.")] = HOME,
+    far: Annotated[list[str], typer.Option(help="The other, as often.")] = FAR,
+    games: Annotated[int, typer.Option(help="Games of each pair.")] = 200,
+    control_dt: Annotated[float, typer.Option(help="s")] = 0.05,
+    width: Annotated[float, typer.Option(help="Width of the goals, m.")] = 0.30,
+) -> None:
+    """Print a row for each reaction and pair of players."""
+    if len(home) != len(far):
+        raise typer.BadParameter(
+            f"{len(far)} for {len(home)} of --home", param_hint="--far"
+        )
+    table = Table(
+        "reaction, s", "home", "far", "score", "draws", "goals", "goals a minute"
+    )
+    for reaction in map(float, reactions.split(",")):
+        for players in zip(home, far, strict=True):
+            cells = play(*players, reaction, games, control_dt, width)
+            table.add_row(f"{reaction:g}", *players, *cells)
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)
