@@ -69,7 +69,7 @@ class Policy(Driver):
             raise ValueError(
                 f"{self.source}: it expects observations of shape {self.shape}, "
                 f"this environment gives {shape}; it was trained on another "
-                "scenario, or with other options (observe, goals, seats)"
+                "scenario, or with other options (observe, goals, reaction, seats)"
             )
 
     def _actions(self, observation: Any) -> Array:
