@@ -128,9 +128,9 @@ def test_goals_and_a_reaction_are_refused_together():
         make(scenario="hit_goal", options={"goals": "dict"})
 
 
-@pytest.mark.parametrize("scenario", ["juggle", "move_block", "free_for_all"])
-def test_any_scenario_can_be_late(scenario):
-    world = make(worlds=2, scenario=scenario)
+@pytest.mark.parametrize("name", ["juggle", "move_block", "free_for_all"])
+def test_any_scenario_can_be_late(name):
+    world = make(worlds=2, scenario=name)
     world.reset(0)
     for _ in range(5):
         result = world.step(np.zeros((2, len(world.open), 2)))
