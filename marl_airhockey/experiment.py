@@ -57,14 +57,14 @@ def league(
     """Let every player play every other and rate them.
 
     Args:
-        scenario: a game of two teams.
+        scenario: a game of two sides or more.
         players: players of any kind by name, see `registry.make_agent`; or names alone.
         games: number of games of each pair; they change ends at half of them.
         seed: seed of the first game.
         **keywords: of the environment.
 
     Raises:
-        ValueError: a single player, or a scenario that is no game of two teams.
+        ValueError: a single player, or a scenario without sides that play each other.
     """
     named = players if isinstance(players, Mapping) else {n: n for n in players}
     drivers = {name: make_agent(player) for name, player in named.items()}

@@ -36,7 +36,7 @@ SCRIPTS = (
 
 
 def league(
-    scenario: Annotated[str, typer.Argument(help="A game of two teams.")],
+    scenario: Annotated[str, typer.Argument(help="A game of two sides or more.")],
     players: Annotated[
         list[str] | None,
         typer.Argument(help="Drivers and policies; all scripts if none are given."),
@@ -99,7 +99,7 @@ def best_responses(
     """Train a best response to each player and return its scores, by player.
 
     Args:
-        scenario: a game of two teams.
+        scenario: a game of two sides or more.
         names: of the players.
         steps: of training.
         seeds: best responses to each player, of seeds 0 .. seeds - 1.
@@ -125,13 +125,15 @@ def best_responses(
 
 def table(standings: Standings) -> Table:
     """Return a table of the players, the best first."""
-    shown = Table("player", "Elo", "95 %", "score", "won", "drawn", "lost", "goals")
+    names = ("player", "Elo", "95 %", "score", "Nash", "won", "drawn", "lost", "goals")
+    shown = Table(*names)
     for row in standings.rows():
         shown.add_row(
             row["player"],
             f"{row['elo']:.0f}",
             f"{row['elo_low']:.0f}..{row['elo_high']:.0f}",
             f"{row['score']:.3f}",
+            f"{row['nash_share']:.2f}",
             f"{row['wins']}",
             f"{row['draws']}",
             f"{row['losses']}",

@@ -21,6 +21,8 @@ class GameResults:
     """(G, T) bool, True for the winner; all False in a draw"""
     margin: Array
     """(G, T) return of a team's seats: goals for minus goals against"""
+    lasted: Array
+    """(G, T) time at which the last seat of a team was out, s; infinite if none was"""
     seconds: Array
     """(G,) length, s"""
 
@@ -29,6 +31,26 @@ class GameResults:
         """(G, T) points: 1 for a win, an equal share of 1 for a draw."""
         drawn = ~self.won.any(-1, keepdims=True)
         return np.asarray(self.won + drawn / self.won.shape[1])
+
+    @property
+    def ahead(self) -> Array:
+        """(G, T, T) bool: the first team came in ahead of the second.
+
+        The winner, then who was out later, then who has the better margin.
+        """
+        ahead = np.zeros((*self.won.shape, self.won.shape[1]), np.bool_)
+        equal = np.ones_like(ahead)
+        for merit in (self.won, self.lasted, self.margin):
+            first, second = merit[:, :, None], merit[:, None]
+            ahead |= equal & (first > second)
+            equal &= first == second
+        return ahead
+
+    @staticmethod
+    def joined(parts: Sequence[GameResults]) -> GameResults:
+        """Return the results of several batches as one."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return GameResults(*map(np.concatenate, columns))
 
 
 def teams_of(seats: Sequence[int]) -> Array:
@@ -102,15 +124,23 @@ def play_games(
     roster.begin(np.arange(games))
     first = [int(np.flatnonzero(teams == team)[0]) for team in range(teams.max() + 1)]
     won, margin = np.zeros(lineups.shape, np.bool_), np.zeros(lineups.shape)
+    lasted = np.full(lineups.shape, np.inf)
     seconds, playing = np.zeros(games), np.ones(games, np.bool_)
     actions = np.zeros((games, len(teams), 2))
     while playing.any():
         roster.ask(actions)
         step = world.step(actions)
+        retired, now = world.retired, world.state.time[:, None]
+        if retired is not None:
+            out = np.stack(
+                [retired[:, teams == t].all(-1) for t in np.unique(teams)], 1
+            )
+            out &= playing[:, None]
+            lasted = np.where(out, np.minimum(lasted, now), lasted)
         ended = playing & (step.terminated | step.truncated)
         won[ended] = world.episode.success[ended][:, first]
         margin[ended] = world.episode.returns[ended][:, first]
         seconds[ended] = world.state.time[ended]
         playing &= ~ended
     world.close()
-    return GameResults(won, margin, seconds)
+    return GameResults(won, margin, lasted, seconds)

@@ -1,20 +1,20 @@
-"""Round-robin league of players of a game of two teams."""
+"""League of players of a game of two sides or more."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import combinations
+from itertools import combinations, permutations
 from pathlib import Path
 
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.evaluation.games import GameResults, play_games
+from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.toolkit.policies import policies_of
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.build import Keywords, scenario_of
 
 LEAGUE_SEED = 3_000_000
 """Seed of a league's first game"""
@@ -31,47 +31,99 @@ def play_league(
 ) -> Standings:
     """Let every player play every other.
 
+    In games of more than two sides all comparisons of places count, as a Plackett-Luce
+    model is fitted by all pairs of its rankings (Azari Soufiani and others, 2013).
+
     Args:
-        scenario: name of a game of two teams.
+        scenario: name of a game of two sides or more.
         players: drivers by name, two at least.
-        games: number of games of each pair; they change ends at half of them.
+        games: number of games of each pair, on average if there are more than two
+            sides; of two, they change ends at half of them.
         seed: seed of the first game.
         keywords: keywords of the environment.
 
     Raises:
-        ValueError: a single player, or a scenario that is no game of two teams.
+        ValueError: a single player, an odd number of games, or a scenario without
+            sides that play against each other.
     """
-    names, count = tuple(players), len(players)
+    count = len(players)
     if count < 2:
         raise ValueError("a league needs at least two players, of different names")
     if games < 2 or games % 2:
         raise ValueError(
             f"games: {games} must be an even number above 0, as ends change at half"
         )
-    pairs = np.array(list(combinations(range(count), 2)))
-    lineups = pairs.repeat(games, axis=0)
-    swapped = np.arange(len(lineups)) % games >= games // 2
-    lineups[swapped] = lineups[swapped, ::-1]
-    parts = [
-        play_games(scenario, list(players.values()), some, seed + first, keywords)
-        for first in range(0, len(lineups), BATCH)
-        for some in [lineups[first : first + BATCH]]
-    ]
-    results = GameResults(
-        *[np.concatenate(x) for x in zip(*map(_arrays, parts), strict=True)]
+    scene = scenario_of(scenario, keywords or {}).scene
+    sides = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
+    lineups = lineups_of(count, max(sides, 2), games, seed)
+    results = GameResults.joined(
+        [
+            play_games(scenario, list(players.values()), some, seed + first, keywords)
+            for first in range(0, len(lineups), BATCH)
+            for some in [lineups[first : first + BATCH]]
+        ]
     )
-    # Columns in the order of `pairs`, whatever the ends.
-    won, margin = results.won, results.margin
-    won[swapped], margin[swapped] = won[swapped, ::-1], margin[swapped, ::-1]
-    won = won.reshape(len(pairs), games, 2)
-    wins, draws, goals = np.zeros((3, count, count))
-    a, b = pairs.T
-    wins[a, b], wins[b, a] = won.sum(1).T
-    draws[a, b] = draws[b, a] = (~won.any(-1)).sum(1)
-    goals[a, b], goals[b, a] = margin.reshape(len(pairs), games, 2).mean(1).T
-    low, ratings, high = _ratings(wins, draws, pairs, seed)
+    wins, draws, margin = compared(results, lineups, count)
+    low, ratings, high = _ratings(wins, draws, sides - 1, seed)
     spread = np.stack([low, high], -1)
-    return Standings(scenario, names, games, wins, draws, goals, ratings, spread)
+    return Standings(
+        scenario, tuple(players), games, wins, draws, margin, ratings, spread
+    )
+
+
+def lineups_of(players: int, sides: int, games: int, seed: int) -> Array:
+    """Return (G, sides) who plays where, so that each pair meets ``games`` times.
+
+    With two sides each pair does, half of the games at either end. With more, those who
+    have met least meet in each game, on average ``games`` times; nobody plays twice in
+    a game unless there are fewer players than sides.
+    """
+    if sides == 2:
+        pairs = np.array(list(combinations(range(players), 2))).repeat(games, axis=0)
+        swapped = np.arange(len(pairs)) % games >= games // 2
+        pairs[swapped] = pairs[swapped, ::-1]
+        return pairs
+    rng, met = np.random.default_rng(seed), np.zeros((players, players))
+    pairs_a_game = min(sides, players) * (min(sides, players) - 1)
+    rows = []
+    for _ in range(-(-games * players * (players - 1) // pairs_a_game)):
+        row: list[int] = []
+        while len(row) < sides:
+            cost = met[row].sum(0) if row else met.sum(0)
+            cost = cost + rng.uniform(0.0, 0.5, players)
+            # Those who are in come again when all are.
+            cost[row] += 1e9 * np.array([row.count(player) for player in row])
+            row.append(int(cost.argmin()))
+        for a, b in combinations(sorted(set(row)), 2):
+            met[a, b] = met[b, a] = met[a, b] + 1
+        rows.append(rng.permutation(row))
+    return np.array(rows)
+
+
+def compared(
+    results: GameResults, lineups: Array, players: int
+) -> tuple[Array, Array, Array]:
+    """Compare all players in all games by their places.
+
+    Args:
+        results: of G games.
+        lineups: (G, T) who played where.
+        players: E.
+
+    Returns:
+        (E, E) each: how often the row's player came in ahead of the column's; how often
+        neither did; mean margin of the row's in games with the column's.
+    """
+    wins, draws, margin = np.zeros((3, players, players))
+    ahead = results.ahead
+    for i, j in permutations(range(lineups.shape[1]), 2):
+        apart = lineups[:, i] != lineups[:, j]
+        a, b = lineups[apart, i], lineups[apart, j]
+        np.add.at(wins, (a, b), ahead[apart, i, j])
+        np.add.at(draws, (a, b), ~(ahead[apart, i, j] | ahead[apart, j, i]))
+        np.add.at(margin, (a, b), results.margin[apart, i])
+    met = wins + wins.T + draws
+    return wins, draws, margin / np.maximum(met, 1.0)
 
 
 def find_policies(folder: Path) -> list[Path]:
@@ -94,19 +146,23 @@ def find_policies(folder: Path) -> list[Path]:
     return found
 
 
-def _arrays(results: GameResults) -> tuple[Array, Array, Array]:
-    return results.won, results.margin, results.seconds
-
-
-def _ratings(wins: Array, draws: Array, pairs: Array, seed: int) -> Array:
+def _ratings(wins: Array, draws: Array, share: int, seed: int) -> Array:
     """Return (3, E) lower ends, medians and upper ends of ratings, 95 % between ends.
 
     Ratings are drawn from what the shares of won, drawn and lost games of each pair may
     be (Dirichlet, Jeffreys' prior), so that 100 wins of 100 leave a doubt, too.
+
+    Args:
+        wins: (E, E) comparisons.
+        draws: (E, E) those without a winner.
+        share: comparisons of a player in one game. They share its luck, so that each
+            counts as so much less than a game of its own.
+        seed: of the draws.
     """
-    rng, found, (a, b) = np.random.default_rng(seed), [], pairs.T
-    counts = np.stack([wins[a, b], draws[a, b], wins[b, a]], -1)
-    played = wins + wins.T + draws
+    rng, found = np.random.default_rng(seed), []
+    a, b = np.triu_indices(len(wins), 1)
+    counts = np.stack([wins[a, b], draws[a, b], wins[b, a]], -1) / share
+    played = (wins + wins.T + draws) / share
     for _ in range(200):
         shares = rng.standard_gamma(counts + 0.5)
         shares /= shares.sum(-1, keepdims=True)

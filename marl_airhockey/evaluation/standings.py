@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.evaluation.stats import interval, unbeaten_mixture
 from marl_airhockey.types import Array
 
 
@@ -21,13 +21,13 @@ class Standings:
     scenario: str
     names: tuple[str, ...]
     games: int
-    """Number of games of each pair, half of them at either end"""
+    """Number of games of each pair, on average with more than two sides"""
     wins: Array
-    """(E, E) number of games that the row's player won against the column's"""
+    """(E, E) number of games in which the row's player was ahead of the column's"""
     draws: Array
-    """(E, E) number of games without a winner"""
+    """(E, E) number of games in which neither was"""
     margin: Array
-    """(E, E) mean of goals for minus goals against"""
+    """(E, E) mean of the row's goals for minus goals against"""
     ratings: Array
     """(E,) Elo ratings, 1000 on average: the middle of what the games allow"""
     rating_intervals: Array
@@ -41,6 +41,16 @@ class Standings:
         return np.asarray(share)
 
     @property
+    def score_intervals(self) -> Array:
+        """(E, E, 2) 95 % intervals of the scores; nan on the diagonal."""
+        pairs = zip(self.score.flat, self.played.flat, strict=True)
+        ends = [
+            interval(float(score), int(n)) if n else (np.nan, np.nan)
+            for score, n in pairs
+        ]
+        return np.reshape(ends, (*self.score.shape, 2))
+
+    @property
     def played(self) -> Array:
         """(E, E) number of games."""
         return np.asarray(self.wins + self.wins.T + self.draws)
@@ -49,6 +59,15 @@ class Standings:
     def order(self) -> list[int]:
         """Numbers of the players, the best first."""
         return [int(i) for i in np.argsort(-self.ratings, kind="stable")]
+
+    @property
+    def mixture(self) -> Array:
+        """(E,) shares of the players in the mixture that none of them beats.
+
+        Who beats all others has all of it; in a circle all have a part. See
+        `stats.unbeaten_mixture`.
+        """
+        return unbeaten_mixture(np.nan_to_num(self.score, nan=0.5))
 
     @property
     def circles(self) -> list[tuple[str, str, str]]:
@@ -69,6 +88,8 @@ class Standings:
         wins, draws = self.wins.sum(-1), self.draws.sum(-1)
         losses, others = self.wins.sum(0), len(self.names) - 1
         low, high = self.rating_intervals.T
+        mixture = self.mixture
+        against = np.nan_to_num(self.score, nan=0.5) @ mixture
         return [
             {
                 "player": self.names[i],
@@ -76,6 +97,8 @@ class Standings:
                 "elo_low": float(low[i]),
                 "elo_high": float(high[i]),
                 "score": float(np.nanmean(self.score[i])),
+                "nash_share": float(mixture[i]),
+                "nash_score": float(against[i]),
                 "wins": int(wins[i]),
                 "draws": int(draws[i]),
                 "losses": int(losses[i]),
@@ -93,6 +116,7 @@ class Standings:
             "table": self.rows(),
             "players": [self.names[i] for i in order],
             "score": self.score[np.ix_(order, order)].tolist(),
+            "score_intervals": self.score_intervals[np.ix_(order, order)].tolist(),
             "goal_difference": self.margin[np.ix_(order, order)].tolist(),
             "circles": self.circles,
         }
@@ -102,14 +126,16 @@ class Standings:
         lines = [
             f"# League of {self.scenario}: {self.games} games of each pair",
             "",
-            "| player | Elo (95 %) | score | won | drawn | lost | goals a game |",
-            "| --- | --- | --- | --- | --- | --- | --- |",
+            "| player | Elo (95 %) | score | Nash share | score against it | won "
+            "| drawn | lost | goals a game |",
+            "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
         ]
         for r in self.rows():
             lines.append(
                 f"| {r['player']} | {r['elo']:.0f} ({r['elo_low']:.0f}.."
-                f"{r['elo_high']:.0f}) | {r['score']:.3f} | {r['wins']} | {r['draws']}"
-                f" | {r['losses']} | {r['goal_difference']:+.2f} |"
+                f"{r['elo_high']:.0f}) | {r['score']:.3f} | {r['nash_share']:.2f} | "
+                f"{r['nash_score']:.3f} | {r['wins']} | {r['draws']} | {r['losses']} | "
+                f"{r['goal_difference']:+.2f} |"
             )
         lines += ["", *(f"Circle: {' > '.join((*c, c[0]))}" for c in self.circles)]
         return "\n".join(lines).rstrip() + "\n"

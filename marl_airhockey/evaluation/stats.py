@@ -91,3 +91,34 @@ def elo(score: Array, games: Array) -> Array:
             break
         share = new
     return np.asarray(1000.0 + 400.0 * np.log10(share))
+
+
+def unbeaten_mixture(score: Array, temperature: float = 0.003) -> Array:
+    """Return the mixture of E players that no player beats: Nash averaging.
+
+    Of all equilibria of the game in which both sides choose a player it is, nearly, the
+    one of most entropy, so that copies of a player share its part (Balduzzi and others,
+    2018). It is the logit equilibrium of a low temperature, found by mirror steps with
+    a look ahead, which converge.
+
+    Args:
+        score: (E, E) share of points of the row's player against the column's.
+        temperature: in points; a player that scores so much less against the mixture
+            has about a third of the share.
+
+    Returns:
+        (E,) shares, 1 in sum.
+    """
+    edge, step = (score - score.T) / 2.0, 1.0
+    keep = 1.0 - step * temperature
+    weight = np.zeros(len(score))
+    for _ in range(4000):
+        ahead = keep * weight + step * edge @ _shares(weight)
+        weight = keep * weight + step * edge @ _shares(ahead)
+    return _shares(weight)
+
+
+def _shares(weight: Array) -> Array:
+    """Return exponentials of weights (E,) as shares."""
+    share = np.exp(weight - weight.max())
+    return np.asarray(share / share.sum())

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
-from marl_airhockey.evaluation.games import play_games
+from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.config import load_config, preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import find_scenario, make_agent
 from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.world.build import Keywords
 
 GAMES = 400
 """Games by which a response is measured"""
@@ -24,15 +23,15 @@ def best_response(
     """Train a policy against a fixed player and return its score against it.
 
     Args:
-        scenario: name of a game of two teams.
+        scenario: name of a game of two sides or more.
         player: a driver's name or a policy's path.
         steps: steps of single worlds.
         folder: folder of the run; a run that is there already is not trained again.
         seed: seed of worlds and network.
 
     Returns:
-        The response's share of won games, a draw counting half: 0.5 if training found
-        nothing better than the player.
+        The response's share of won games, a draw shared by all sides: of two sides 0.5
+        if training found nothing better than the player, of four 0.25.
 
     Raises:
         ValueError: the folder holds a run of an older version.
@@ -45,13 +44,7 @@ def best_response(
     else:
         changes = {"drivers": drivers, "total_steps": steps, "seed": seed}
         train(preset(scenario, {**changes, "evaluations": 4}), folder)
-    lineups = np.array([[0, 1], [1, 0]]).repeat(GAMES // 2, axis=0)
-    response = load_policy(folder / "last.npz")
-    results = play_games(
-        scenario,
-        [response, make_agent(player)],
-        lineups,
-        SEED,
-        {"backend": "numba"},
-    )
-    return float(results.score[lineups == 0].mean())
+    response, rivals = load_policy(folder / "last.npz"), [make_agent(player)]
+    keywords: Keywords = {"backend": "numba"}
+    score, _ = play_against(scenario, response, rivals, GAMES, SEED, keywords)
+    return float(score[0])
