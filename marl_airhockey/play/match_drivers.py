@@ -68,12 +68,12 @@ class MatchDrivers:
         found: list[tuple[bool, str]] = []
         for name in zoo_names():
             card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
-            labels = observer.prepare(card["observe"]).labels
+            # First what costs nothing: forms of observations that are asked for compile.
+            if card["scenario"] != scenario.name:
+                continue
             seats = make_scenario(card["scenario"], **card["options"]).seats
-            if (card["scenario"], card["labels"], seats) == (
-                scenario.name,
-                list(labels),
-                scenario.seats,
+            if seats == scenario.seats and card["labels"] == list(
+                observer.prepare(card["observe"]).labels
             ):
                 found.append((card["profile"] != self._profile, name))
         return [name for _, name in sorted(found)]

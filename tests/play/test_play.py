@@ -161,7 +161,8 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
             ["zoo/duel_robot"],
         ),
         ("free_for_all", {"options": {"sides": 3}}, []),
-        ("juggle", {}, ["zoo/juggle"]),
+        ("juggle", {}, ["zoo/juggle", "zoo/juggle_ur5e"]),
+        ("juggle", {"profile": "ur5e"}, ["zoo/juggle_ur5e", "zoo/juggle"]),
     ],
 )
 def test_policies_that_fit_are_offered(game, keywords, fitting):
