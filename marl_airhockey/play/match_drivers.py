@@ -68,7 +68,8 @@ class MatchDrivers:
         found: list[tuple[bool, str]] = []
         for name in zoo_names():
             card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
-            # First what costs nothing: forms of observations that are asked for compile.
+            # First what costs nothing: a form of observations that is asked for is
+            # compiled.
             if card["scenario"] != scenario.name:
                 continue
             seats = make_scenario(card["scenario"], **card["options"]).seats
