@@ -1,7 +1,7 @@
 """Play duels at several reactions: who wins, how many are drawn, goals a minute.
 
     python scripts/sweep_reaction.py
-    python scripts/sweep_reaction.py --home zoo/duel --far goalkeeper --reactions 0.15
+    python scripts/sweep_reaction.py --home allround --far striker --reactions 0.15
 
 A reaction is the time by which seats see pucks and the other paddle late. Without one a
 keeper that reckons ahead stops everything; with one attack pays.

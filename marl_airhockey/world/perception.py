@@ -32,15 +32,19 @@ class Perception:
     def begin(self, worlds: Array, parts: Parts) -> None:
         """Begin anew in some worlds, by index (W,)."""
         for key, now in _arrays(parts):
-            if key not in self._past:
-                self._past[key] = np.empty((self.steps + 1, *now.shape), now.dtype)
-            self._past[key][:, worlds] = now[worlds]
+            self._ring(key, now)[:, worlds] = now[worlds]
 
     def push(self, parts: Parts) -> None:
         """Take what is sensed after a step."""
         self._newest = (self._newest + 1) % (self.steps + 1)
         for key, now in _arrays(parts):
-            self._past[key][self._newest] = now
+            self._ring(key, now)[self._newest] = now
+
+    def _ring(self, key: tuple[str, str], now: Array) -> Array:
+        """Return the past of an array; a driver may ask for one at any time."""
+        if key not in self._past:
+            self._past[key] = np.repeat(now[None], self.steps + 1, axis=0)
+        return self._past[key]
 
     def seen(self, part: str) -> dict[str, Any]:
         """Return the arrays of a part as seats see them now, not to be changed."""

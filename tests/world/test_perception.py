@@ -1,4 +1,4 @@
-"""What seats see late by the reaction of a game, against what was there then."""
+"""Views that are late by the reaction of a game, against what was there then."""
 
 import copy
 
