@@ -29,12 +29,15 @@ class FreeForAll(Scenario):
     """Game in which a goal costs its owner a life and 1 and pays the last toucher 1.
 
     A seat without lives is out: its goal becomes wall and its paddle is parked. The
-    last seat left wins. Serves go to the seat that lost a life; a puck that is held for
-    ``possession`` seconds or is at rest out of every reach goes to the next seat.
+    last seat left wins; when the clock ends the game, the one with most lives, of these
+    the one with most shots on goal. Serves go to the seat that lost a life; a puck that
+    is held for ``possession`` seconds or is at rest out of every reach goes to the next
+    seat.
     """
 
     seats: str = "arcade"
     seconds: float = 90.0
+    reaction: float = 0.15
     sides: int = 4
     """Number of sides of the table, and of seats."""
     inradius: float = 0.45
@@ -45,6 +48,8 @@ class FreeForAll(Scenario):
     """Width of the goal lines (m)."""
     possession: float = 5.0
     """Longest time that a seat may have the puck in its reach (s)."""
+    shot_weight: float = 0.0
+    """Reward of a shot on goal that was stopped; its cost for who stopped it."""
     jitter_weight: float = 0.0
 
     def __post_init__(self) -> None:
@@ -82,6 +87,8 @@ class FreeForAll(Scenario):
         return {
             **super().initial_memory(state, rng),
             "lives": np.full((worlds, self.sides), float(self.lives)),
+            "shots": np.zeros((worlds, self.sides)),
+            "stopped": np.zeros((worlds, self.sides)),
             "held": np.zeros((worlds, self.sides, 1)),
             "lying": np.zeros((worlds, 1)),
             "toucher": np.zeros((worlds, 1)),
@@ -97,9 +104,10 @@ class FreeForAll(Scenario):
     def update_memory(self, t: Transition) -> Memory:
         lost = t.after.crossed[..., 0, :] & (t.memory["lives"] > 0.0)
         lives = t.memory["lives"] - lost
-        held = rewards.held(self.scene, t)
+        # A seat that is out holds nothing: a puck at rest before it lies.
+        held = np.where((lives > 0.0)[..., None], rewards.held(self.scene, t), 0.0)
         lying = rewards.lying(t, held)
-        foul = (held[..., 0] >= self.possession - 1e-9) & (lives > 0.0)
+        foul = held[..., 0] >= self.possession - 1e-9
         gone = (lying[..., 0] >= 1.0 - 1e-9) | t.after.lifted[..., 0]
         dead = gone & ~lost.any(-1)
         serve = np.full_like(t.memory["served"], -1.0)
@@ -110,9 +118,12 @@ class FreeForAll(Scenario):
             serve = np.where(again, follower, serve)
             serve = np.where(lost[..., side], heir, serve)
         fresh = serve >= 0.0
+        saves = rewards.saves(self.scene, t, t.memory["toucher"])
         toucher = rewards.last_toucher(t.memory["toucher"], t.after)
         return {
             "lives": lives,
+            "shots": t.memory["shots"] + saves.sum(-2),
+            "stopped": t.memory["stopped"] + saves.sum(-1),
             "held": np.where(fresh[..., None, None], 0.0, held),
             "lying": np.where(fresh[..., None], 0.0, lying),
             "toucher": np.where(fresh[..., None], 0.0, toucher),
@@ -145,11 +156,18 @@ class FreeForAll(Scenario):
 
         conceded: -1 for each life that the seat loses.
         scored: 1 for the seat that touched the puck last when another loses a life.
+        shot: ``shot_weight`` for each shot on goal that another seat stopped, and minus
+        that for each that it stopped itself.
         """
         lost = t.memory["lives"] - t.new_memory["lives"]
         own = 1.0 + np.arange(self.sides)
         scored = (t.new_memory["scorer"] == own) & (lost.sum(-1, keepdims=True) > 0.0)
-        return {"conceded": -lost, "scored": 1.0 * (scored & (lost == 0.0))}
+        terms = {"conceded": -lost, "scored": 1.0 * (scored & (lost == 0.0))}
+        if self.shot_weight:
+            new, old = t.new_memory, t.memory
+            shots = new["shots"] - old["shots"] - (new["stopped"] - old["stopped"])
+            terms["shot"] = self.shot_weight * shots
+        return terms
 
     def terminated(self, t: Transition) -> Array:
         return np.asarray((1.0 * (t.new_memory["lives"] > 0.0)).sum(-1) <= 1.0)
@@ -170,9 +188,12 @@ class FreeForAll(Scenario):
         return "lives " + " : ".join(f"{lives:.0f}" for lives in memory["lives"])
 
     def success(self, t: Transition) -> Array:
-        """(..., seats) bool: the game has ended and the seat has lives left."""
-        alive = t.new_memory["lives"] > 0.0
-        return np.asarray(alive & self.terminated(t)[..., None])
+        """(..., seats) bool: the seat is the last one, or leads as the clock ends."""
+        lives, shots = t.new_memory["lives"], t.new_memory["shots"]
+        merit = np.where(lives == lives.max(-1, keepdims=True), shots, -1.0)
+        best = merit == merit.max(-1, keepdims=True)
+        alone = best.sum(-1, keepdims=True) == 1
+        return np.asarray(best & alone & (self.terminated(t) | t.last)[..., None])
 
 
 make = FreeForAll

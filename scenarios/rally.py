@@ -23,18 +23,21 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Rally(Scenario):
-    """Game in which a crossing of the middle pays both 1 if it was struck from there.
+    """Game in which a crossing of the middle pays both 1 if it was struck from an end.
 
-    The seat whose half the puck leaves must have touched it last and must not be the
-    one of the last counted crossing. Only distinct touches are strikes: a puck that
-    both squeeze at the middle earns nothing. ``patience`` seconds without a counted
-    crossing end the rally, and so does a puck at rest.
+    The puck must have been beyond ``depth`` in the half that it leaves. The seat there
+    must have touched it last and must not be the one of the last counted crossing.
+    Only distinct touches are strikes: a puck that both squeeze at the middle earns
+    nothing. ``patience`` seconds without a counted crossing end the rally, and so does
+    a puck at rest.
     """
 
     seats: str = "arcade"
     seconds: float = 30.0
     crossings: int = 15
     """Number of counted crossings that is a success."""
+    depth: float = 0.3
+    """Distance from the middle beyond which the puck must have been (m)."""
     patience: float = 4.0
     """Longest time without a counted crossing (s)."""
     jitter_weight: float = 0.0
@@ -55,6 +58,7 @@ class Rally(Scenario):
         names = ("toucher", "counted", "crossings", "idle")
         none = {name: np.zeros(len(rng)) for name in names}
         touches = super().initial_memory(state, rng)
+        none["deep"] = np.zeros((len(rng), 1))
         return {**touches, **none, "strikes": touches["touches"].copy()}
 
     def update_memory(self, t: Transition) -> Memory:
@@ -63,16 +67,23 @@ class Rally(Scenario):
         at = np.where(fresh, t.after.touched_at[..., 0], -1.0)
         latest = np.where(at[..., 0] > at[..., 1], 1.0, 2.0)
         toucher = np.where(fresh.any(-1), latest, old)
+        x = t.after.puck[..., 0, 0]
         left = t.before.puck[..., 0, 0] < 0.0
-        crossed = left != (t.after.puck[..., 0, 0] < 0.0)
+        crossed = left != (x < 0.0)
         # Seats are numbered from 1, as in `last_toucher`.
         seat = np.where(left, 1.0, 2.0)
         counts = crossed & ((toucher == seat) | (old == seat))
-        counts = counts & (t.memory["counted"] != seat)
+        # How far into the half that it leaves, or will leave, the puck was struck.
+        struck = rewards.contact_height(t)[..., 0]
+        into = np.where(np.isnan(struck), 0.0, np.where(left, -struck, struck))
+        deep = (t.memory["deep"][..., 0] > 0.0) | (into > self.depth)
+        counts = counts & deep & (t.memory["counted"] != seat)
+        deep = (deep & ~crossed) | (np.maximum(np.abs(x), -into) > self.depth)
         return {
             "toucher": toucher,
             "counted": np.where(counts, seat, t.memory["counted"]),
             "crossings": t.memory["crossings"] + counts,
+            "deep": 1.0 * deep[..., None],
             "strikes": t.new_memory["touches"],
             "idle": np.where(
                 counts, 0.0, t.memory["idle"] + t.after.time - t.before.time
@@ -86,12 +97,13 @@ class Rally(Scenario):
         observables.OwnToPucks(),
         observables.IsThisSeat("toucher"),
         observables.IsThisSeat("counted"),
+        observables.FromMemory("deep", 0.0, 1.0, 1.0),
     )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
         """Return the terms.
 
-        crossing: 1 for both when a returned puck crosses the middle line.
+        crossing: 1 for both when a puck struck from an end crosses the middle line.
         """
         counted = t.new_memory["crossings"] - t.memory["crossings"]
         return {"crossing": counted[..., None] * np.ones(2)}

@@ -62,7 +62,7 @@ CASES: tuple[tuple[str, str, dict[str, Any], Callable[[int], ActionRule]], ...] 
         "duel",
         {
             "drivers": {f"paddle_{i}": "zoo/duel_robot" for i in (0, 1)},
-            "options": {"seats": "robot"},
+            "options": {"seats": "robot", "reaction": 0.0},
         },
         nobody,
     ),

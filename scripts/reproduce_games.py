@@ -4,8 +4,8 @@
 
 A run that is there already is not trained again. A score is the share of whole games
 won, a draw counting half (in free_for_all, of four players, a quarter), with 95 %
-intervals; ends alternate. Cooperative games: the mean return of an episode, of pairs
-from one seed, of pairs put together from two seeds, and of a scripted pair.
+intervals; ends alternate. Cooperative games: the mean return of an episode and success,
+of pairs from one seed, of pairs put together from two seeds, and of scripted pairs.
 """
 
 from __future__ import annotations
@@ -22,21 +22,19 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from marl_airhockey.cli.league import SCRIPTS
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.charts import DPI, INK, INKS, plot_iqm, save, tidy
-from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.evaluation.crossplay import play_together
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.evaluation.stats import bootstrap, interval
-from marl_airhockey.learn.config import preset
+from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.learn.config import OPPONENTS, preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
 COOPERATIVE = ("rally", "team_juggle")
-SEEN = ("random", "striker", "allround", "allround:strength=fair")
-UNSEEN = ("goalkeeper", "striker:strength=fair", "allround:strength=weak")
-"""Opponents that are in the presets' training, and others"""
 ON_NUMBA: Keywords = {"backend": "numba"}
 GAMES, SEED = 400, 5_000_000
 
@@ -61,11 +59,11 @@ def cpu_minutes(folder: Path) -> float:
 
 def competitive_table(game: str, folders: Sequence[Path]) -> Table:
     """Return scores of each seed against scripts and against its own checkpoint."""
-    names = [*SEEN, *UNSEEN, "itself at 1/10"]
+    names = [*SCRIPTS, "itself at 1/10"]
     table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
     columns = []
     for folder in folders:
-        rivals: list[Driver] = [make_agent(name) for name in (*SEEN, *UNSEEN)]
+        rivals: list[Driver] = [make_agent(name) for name in SCRIPTS]
         rivals.append(load_policy(checkpoint(folder, 0.1)))
         policy = load_policy(folder / "last.npz")
         score, _ = play_against(game, policy, rivals, GAMES, SEED, ON_NUMBA)
@@ -75,7 +73,8 @@ def competitive_table(game: str, folders: Sequence[Path]) -> Table:
         for score in columns:
             low, high = interval(float(score[i]), GAMES)
             cells.append(f"{score[i]:.3f} ({low:.2f}..{high:.2f})")
-        table.add_row(name, "yes" if name in SEEN else "no", *cells)
+        seen = name.removesuffix(":strength=strong") in OPPONENTS
+        table.add_row(name, "yes" if seen else "no", *cells)
     minutes = [f"{cpu_minutes(folder):.1f}" for folder in folders]
     table.add_row("CPU-minutes of training", "", *minutes)
     return table
@@ -83,29 +82,22 @@ def competitive_table(game: str, folders: Sequence[Path]) -> Table:
 
 def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
     """Return returns and success of pairs."""
-    table = Table("pair", "return (95 %)", "success")
-
-    def add(name: str, pairs: Sequence[tuple[Driver, Driver]]) -> None:
-        found = [
-            evaluate(
-                a, name, game, GAMES, SEED, {**ON_NUMBA, "drivers": {"paddle_1": b}}
-            )
-            for a, b in pairs
-        ]
-        returns = np.array([r.returns for r in found])
-        low, high = bootstrap(returns, lambda x: float(x.mean()))
-        share = np.mean([r.success for r in found])
-        table.add_row(
-            name, f"{returns.mean():.1f} ({low:.1f}..{high:.1f})", f"{share:.3f}"
-        )
-
-    policies = [load_policy(folder / "last.npz") for folder in folders]
-    add("one seed", [(p, p) for p in policies])
-    mixed = [(a, b) for a in policies for b in policies if a is not b]
-    if mixed:
-        add("two seeds", mixed)
-    for script in ("striker", "allround"):
-        add(f"two of {script}", [(make_agent(script), make_agent(script))])
+    table = Table("pair", "return", "success")
+    players: dict[str, Driver] = {str(f): load_policy(f / "last.npz") for f in folders}
+    scripts = {name: make_agent(name) for name in ("striker", "allround")}
+    learned = play_together(game, players, GAMES, SEED, ON_NUMBA)
+    scripted = play_together(game, scripts, GAMES, SEED, ON_NUMBA)
+    same = np.eye(len(players), dtype=bool)
+    rows = {
+        "of one seed": (learned.returns[same], learned.success[same]),
+        "of two seeds": (learned.returns[~same], learned.success[~same]),
+    }
+    for i, name in enumerate(scripts):
+        rows[f"two of {name}"] = scripted.returns[i, i], scripted.success[i, i]
+    for name, (returns, success) in rows.items():
+        table.add_row(name, f"{np.mean(returns):.1f}", f"{np.mean(success):.3f}")
+    low, high = learned.gap_interval
+    table.add_row("gap", f"{learned.gaps.mean():.1f} ({low:.1f}..{high:.1f})", "")
     return table
 
 

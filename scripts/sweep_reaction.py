@@ -1,10 +1,11 @@
-"""Play duels at several reactions: who wins, how many are drawn, goals a minute.
+"""Play duels at several reactions: who wins, how many are level, goals and shots.
 
     python scripts/sweep_reaction.py
-    python scripts/sweep_reaction.py --home allround --far striker --reactions 0.15
+    python scripts/sweep_reaction.py --home zoo/duel --far allround --reactions 0.15
 
 A reaction is the time by which seats see pucks and the other paddle late. Without one a
-keeper that reckons ahead stops everything; with one attack pays.
+keeper that reckons ahead stops everything; with one attack pays. The score is by goals
+alone: a level game, which shots on goal decide, is half a win here.
 """
 
 from __future__ import annotations
@@ -48,22 +49,33 @@ def play(
     )
     world.autoreset = False
     world.reset(SEED)
-    goals, minutes = np.zeros((games, 2)), np.zeros(games)
+    goals, shots = np.zeros((2, games, 2))
+    minutes, banked, banks = np.zeros((3, games))
     playing = np.ones(games, np.bool_)
     while playing.any():
+        before = world.memory["goals"].sum(-1)
         step = world.step(np.zeros((games, 0, 2)))
+        state = world.state
+        banked[state.touched.any((1, 2))] = 0.0
+        banked += state.banked[:, 0, [1, 3]].sum(-1)
+        scored = playing & (world.memory["goals"].sum(-1) > before)
+        banks += scored & (banked > 0.0)
+        banked[scored] = 0.0
         ended = playing & (step.terminated | step.truncated)
         goals[ended] = world.memory["goals"][ended]
-        minutes[ended] = world.state.time[ended] / 60.0
+        shots[ended] = goals[ended] + world.memory["stopped"][ended]
+        minutes[ended] = state.time[ended] / 60.0
         playing &= ~ended
     world.close()
-    draws = float((goals[:, 0] == goals[:, 1]).mean())
-    low, high = interval(draws, games)
+    level = float((goals[:, 0] == goals[:, 1]).mean())
+    low, high = interval(level, games)
     return (
-        f"{(goals[:, 0] > goals[:, 1]).mean() + draws / 2:.2f}",
-        f"{draws:.2f} ({low:.2f}..{high:.2f})",
+        f"{(goals[:, 0] > goals[:, 1]).mean() + level / 2:.2f}",
+        f"{level:.2f} ({low:.2f}..{high:.2f})",
         " : ".join(f"{scored:.1f}" for scored in goals.mean(0)),
         f"{goals.sum() / minutes.sum():.1f}",
+        f"{goals.sum() / max(shots.sum(), 1.0):.2f}",
+        f"{banks.sum() / max(goals.sum(), 1.0):.2f}",
     )
 
 
@@ -83,13 +95,21 @@ def main(
             f"{len(far)} for {len(home)} of --home", param_hint="--far"
         )
     table = Table(
-        "reaction, s", "home", "far", "score", "draws", "goals", "goals a minute"
+        "reaction, s",
+        "home",
+        "far",
+        "score",
+        "level",
+        "goals",
+        "goals a minute",
+        "goals a shot",
+        "of them banks",
     )
     for reaction in map(float, reactions.split(",")):
         for players in zip(home, far, strict=True):
             cells = play(*players, reaction, games, control_dt, width)
             table.add_row(f"{reaction:g}", *players, *cells)
-    Console().print(table)
+    Console(width=110).print(table)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@ import typer
 from marl_airhockey import __version__
 from marl_airhockey.cli import (
     bench,
+    challenge,
+    crossplay,
     evaluate,
     league,
     listing,
@@ -33,7 +35,18 @@ def _tell_version(given: bool) -> None:
 
 
 # Importing these modules adds their commands to the application.
-__all__ = ["bench", "evaluate", "listing", "main", "new", "train", "warm", "watch"]
+__all__ = [
+    "bench",
+    "challenge",
+    "crossplay",
+    "evaluate",
+    "listing",
+    "main",
+    "new",
+    "train",
+    "warm",
+    "watch",
+]
 app.command()(league.league)
 app.command()(play.play)
 app.command()(transfer.transfer)

@@ -125,13 +125,16 @@ def _train(
 def export(
     run: Annotated[Path, typer.Argument(help="Folder of a training run.")],
     out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
+    checkpoint: Annotated[
+        Path | None, typer.Option(help="One of the run's instead of its last policy.")
+    ] = None,
     trust: Trusting = False,
 ) -> None:
     """Freeze a trained policy into one small file with a card, measured anew."""
     require("stable_baselines3", "train")
     from marl_airhockey.learn.export import export_policy
 
-    console.print_json(json.dumps(dict(export_policy(run, out).card)))
+    console.print_json(json.dumps(dict(export_policy(run, out, checkpoint).card)))
     console.print(f"{out}: {out.stat().st_size / 1000:.0f} kB")
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.reckoning import Walls, reckon
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
@@ -51,8 +52,13 @@ class ObservationContext:
     scene: Scene
     observe: str
     top_speed: float
-    late: bool = False
-    """True if seats see pucks and other paddles late, by the reaction of the game"""
+    reaction: float = 0.0
+    """Time by which seats see pucks and other paddles late, s"""
+
+    @property
+    def reckons(self) -> bool:
+        """True if pucks are shown as they were and as they would be now."""
+        return self.reaction > 0.0 and self.observe != "history"
 
     @cached_property
     def extent(self) -> Array:
@@ -60,6 +66,11 @@ class ObservationContext:
         corners = np.asarray(self.scene.table.vertices)
         rotated = [corners @ r.T for r in self.rotations]
         return np.asarray(np.max(np.abs(rotated), axis=(0, 1)))
+
+    @cached_property
+    def walls(self) -> Walls:
+        """Walls that pucks are brought forward by, table frame."""
+        return Walls.of(self.scene)
 
     @cached_property
     def rotations(self) -> Array:
@@ -140,6 +151,18 @@ class EgoView:
             return seats
         rotated: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
         return rotated
+
+    @property
+    def puck_now(self) -> tuple[Array, Array]:
+        """(..., S, pucks, 2) pucks, brought forward by the reaction if any, m and m/s.
+
+        See `reckoning.reckon`; what paddles did in that time is not known.
+        """
+        if not self.scope.reckons:
+            return self.puck, self.puck_velocity
+        seen = self.state.puck, self.state.puck_velocity
+        now = reckon(*seen, self.scope.reaction, self.scope.walls)
+        return self.rotate(now[0]), self.rotate(now[1])
 
     @property
     def own_then(self) -> tuple[Array, Array]:

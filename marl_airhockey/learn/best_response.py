@@ -7,7 +7,7 @@ from pathlib import Path
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.config import load_config, preset
 from marl_airhockey.learn.train import train
-from marl_airhockey.registry import find_scenario, make_agent
+from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
@@ -21,6 +21,9 @@ def best_response(
     scenario: str, player: str, steps: int, folder: Path, seed: int = 0
 ) -> float:
     """Train a policy against a fixed player and return its score against it.
+
+    In half of the games of training the player is slowed down, see
+    `TrainConfig.opponent_pace`; the score is against the player as it is.
 
     Args:
         scenario: name of a game of two sides or more.
@@ -36,14 +39,13 @@ def best_response(
     Raises:
         ValueError: the folder holds a run of an older version.
     """
-    seats = find_scenario(scenario).scene.seats
-    opponents = [i for i, seat in enumerate(seats) if seat.team != seats[0].team]
-    drivers = {f"paddle_{i}": player for i in opponents}
     if (folder / "state.json").exists():
         load_config(folder / "config.toml")
     else:
-        changes = {"drivers": drivers, "total_steps": steps, "seed": seed}
-        train(preset(scenario, {**changes, "evaluations": 4}), folder)
+        only = {"opponents": [player], "rivals": [player]}
+        alone = {"mirror": 0.0, "script_share": 1.0, "snapshots": 1}
+        length = {"total_steps": steps, "seed": seed, "evaluations": 4}
+        train(preset(scenario, {**only, **alone, **length}), folder)
     response, rivals = load_policy(folder / "last.npz"), [make_agent(player)]
     keywords: Keywords = {"backend": "numba"}
     score, _ = play_against(scenario, response, rivals, GAMES, SEED, keywords)

@@ -17,16 +17,8 @@ from marl_airhockey.toolkit.policies import RUN_FORMAT, check_run_format
 from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.world.build import Keywords
 
-# Not the goalkeeper as it stands: hardly anything gets past it, so that most games
-# against it are drawn and teach nothing.
-OPPONENTS = (
-    "random",
-    "goalkeeper:depth=0.15",
-    "striker",
-    "allround",
-    "allround:strength=fair",
-)
-RIVALS = ("random", "goalkeeper:strength=fair", "striker", "allround")
+OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
+RIVALS = ("random", "goalkeeper", "striker", "allround")
 MAY_BE_ZERO = (
     "seed",
     "num_env_runners",
@@ -52,6 +44,8 @@ class TrainConfig:
     observe: str = "velocity"
     options: dict[str, Any] = field(default_factory=dict)
     """Values of the scenario's own fields, by name"""
+    training_options: dict[str, Any] = field(default_factory=dict)
+    """The same for training alone, not for evaluations; `options` comes first"""
     drivers: dict[str, str] = field(default_factory=dict)
     """Drivers of seats that are not learned, by agent"""
     physics: dict[str, Any] = field(default_factory=dict)
@@ -105,6 +99,9 @@ class TrainConfig:
     """Most snapshots in the pool"""
     priority: float = 2.0
     """Power of an opponent's share of won games, by which it is drawn"""
+    opponent_pace: float = 0.1
+    """In half of the games against others they move at a share of the speed that they
+    command, drawn from here to 1: who never gets past a good one learns nothing"""
     rivals: list[str] = field(default_factory=lambda: list(RIVALS))
     """Drivers that evaluations of games are against"""
 
@@ -126,7 +123,7 @@ class TrainConfig:
                 f"drivers: self-play needs all seats of {self.scenario!r} open; to "
                 "learn against somebody, fill all seats of the other teams"
             )
-        for name in ("mirror", "script_share"):
+        for name in ("mirror", "script_share", "opponent_pace"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
         if self.engine != "sb3" and self.needs_sb3(self.observe, self.options):
@@ -197,7 +194,8 @@ class TrainConfig:
     def training_keywords(self) -> Keywords:
         """Keywords of the environments of training."""
         physics = {**self.training_physics, **self.physics}
-        return {**self.keywords, "physics": physics}
+        options = {**self.training_options, **self.options}
+        return {**self.keywords, "physics": physics, "options": options}
 
     def to_toml(self) -> str:
         """Return the configuration as TOML, readable by `load_config`."""

@@ -24,12 +24,13 @@ GAMES = 200
 """Games against each rival by which a game's policy is measured"""
 
 
-def export_policy(run: Path, out: Path) -> NumpyPolicy:
-    """Write the last policy of a run as .npz, measured on seeds unseen in training.
+def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> NumpyPolicy:
+    """Write a policy of a run as .npz, measured on seeds unseen in training.
 
     Args:
         run: folder of a run of `train`.
         out: the .npz to write.
+        checkpoint: one of the run's ``checkpoints``; None for its last policy.
 
     Raises:
         ValueError: no run, one of an older version, or a policy that has no numpy form.
@@ -37,8 +38,11 @@ def export_policy(run: Path, out: Path) -> NumpyPolicy:
     config = load_config(run / "config.toml")
     if not (run / "state.json").exists():
         raise ValueError(f"{run}: there is no policy in it yet; train it first")
-    progress, last = Progress.load(run / "state.json"), _load_last(run)
-    policy = policy_driver(last, str(run))
+    progress = Progress.load(run / "state.json")
+    last = NumpyPolicy.load(checkpoint) if checkpoint else _load_last(run)
+    steps = last.card["steps"] if checkpoint else progress.steps
+    minutes = progress.cpu_seconds / 60 * steps / progress.steps
+    policy = policy_driver(last, str(checkpoint or run))
     metrics = _games(policy, config) if config.self_play else _episodes(policy, config)
     card = {
         **last.card,
@@ -47,8 +51,8 @@ def export_policy(run: Path, out: Path) -> NumpyPolicy:
         "profile": config.profile,
         "command": training_command(config),
         "seed": config.seed,
-        "steps": progress.steps,
-        "cpu_minutes": round(progress.cpu_seconds / 60, 2),
+        "steps": steps,
+        "cpu_minutes": round(minutes, 2),
         "date": datetime.date.today().isoformat(),
         "grades": metrics,
     }
@@ -108,6 +112,7 @@ def training_command(config: TrainConfig) -> str:
             "snapshots",
             "pool",
             "priority",
+            "opponent_pace",
         }
         named |= {"rivals"}
     for f in fields(config):

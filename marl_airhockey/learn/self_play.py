@@ -30,7 +30,8 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
     In those others, at every start of an episode, the learner is given a team and all
     other teams the same opponent. It is drawn from scripts and from the pool of
     snapshots: the more often the learner loses to one, the more likely (prioritised
-    fictitious self-play; Vinyals et al., 2019).
+    fictitious self-play; Vinyals et al., 2019). In half of these games it moves slower
+    than it wants to.
 
     Args:
         scenario: name of a game with teams.
@@ -40,6 +41,7 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         mirror: share of the worlds in which the learner plays all seats.
         script_share: share of the other worlds' games that are against scripts.
         priority: power of the share of lost games in the drawing.
+        pace: smallest share of their commanded speed at which opponents move.
         size: most snapshots in the pool.
         folder: folder of the snapshots.
         seed: seed of the drawing.
@@ -55,6 +57,7 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         mirror: float,
         script_share: float,
         priority: float,
+        pace: float,
         size: int,
         folder: Path,
         seed: int,
@@ -68,6 +71,7 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         self._priority, self._size, self._folder = priority, size, folder
         self._script_share = script_share if scripts else 0.0
         self._rng = np.random.default_rng(seed)
+        self._slowest, self._pace = pace, np.ones(num_worlds)
         self._roster = Roster(self.world)
         for name in scripts:
             self._roster.add(name, make_agent(name))
@@ -139,6 +143,9 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
             return
         seated = self._roster.seated
         seated[worlds] = self._draw(len(worlds))[:, None]
+        pace = self._rng.uniform(self._slowest, 1.0, len(worlds))
+        full = self._rng.random(len(worlds)) < 0.5
+        self._pace[worlds] = np.where(full, 1.0, pace)
         self._learner[worlds] = self._rng.integers(0, len(self._members), len(worlds))
         mine = self._members[self._learner[worlds]]
         seated[worlds[:, None], mine] = -1
@@ -149,9 +156,10 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         self._roster.begin(worlds)
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
-        """Add the results of games to the running scores; draw new opponents."""
+        """Add results against opponents at full pace to their scores; draw new ones."""
         seats = self._members[:, 0]
-        for world in worlds[worlds >= self._mirrored].tolist():
+        counted = (worlds >= self._mirrored) & (self._pace[worlds] == 1.0)
+        for world in worlds[counted].tolist():
             won = last.success[world, seats]
             player = self._roster.seated[world].max()
             score = float(won[self._learner[world]])
@@ -179,8 +187,9 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
     def step_async(self, actions: Array) -> None:
         """Take the learner's actions (slots, 2) and let the opponents choose theirs."""
         self._actions = np.zeros((self.world.num_worlds, len(self._teams), 2))
-        self._actions[self._rows, self._seats] = actions
         self._roster.ask(self._actions)
+        self._actions *= self._pace[:, None, None]
+        self._actions[self._rows, self._seats] = actions
 
 
 def make_training_env(
@@ -203,6 +212,7 @@ def make_training_env(
         mirror=config.mirror,
         script_share=config.script_share,
         priority=config.priority,
+        pace=config.opponent_pace,
         size=config.pool,
         folder=pool,
         seed=config.seed,

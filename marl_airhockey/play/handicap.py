@@ -56,8 +56,9 @@ class Handicap:
 
 PRESETS = {
     "full strength": Handicap(),
-    "human speed": Handicap(reaction=0.15, noise=0.05, pace=0.7),
-    "gentle": Handicap(reaction=0.25, noise=0.1, pace=0.4),
+    # Beside the reaction of the games, of 0.15 s.
+    "human speed": Handicap(reaction=0.05, noise=0.05, pace=0.7),
+    "gentle": Handicap(reaction=0.1, noise=0.1, pace=0.4),
 }
 """Handicaps that a page offers, the one without limits first."""
 

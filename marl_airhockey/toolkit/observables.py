@@ -25,10 +25,10 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class OwnPaddle(Observable):
-    """Position and velocity of the seat's own paddle, as its robot reports them.
+    """Position and velocity of the own paddle, and (then) when all else was seen.
 
-    In an estimate or a history also the last actions, which may still be on their way;
-    with a reaction also where the paddle was at the moment that is seen of all else.
+    They are as its robot reports them; those of then are there with a reaction. In an
+    estimate or a history also the last actions, which may still be on their way.
     """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
@@ -39,7 +39,7 @@ class OwnPaddle(Observable):
             for ago in range(PENDING, 0, -1):
                 names = (f"own.asked[-{ago}].{axis}" for axis in "xy")
                 columns += [Column(name, -1.0, 1.0, 1.0) for name in names]
-        if scope.late:
+        if scope.reaction:
             columns += scope.position_columns("own.then", (0.2, 0.2), centre)
             columns += scope.velocity_columns(
                 "own.then", scope.top_speed, scope.top_speed
@@ -53,7 +53,7 @@ class OwnPaddle(Observable):
         if ego.scope.observe != "velocity":
             asked, end = ego.asked.swapaxes(-2, -3), 4 + 2 * PENDING
             out[..., 4:end] = asked.reshape(*asked.shape[:-2], -1)
-        if ego.scope.late:
+        if ego.scope.reaction:
             out[..., end : end + 2], out[..., end + 2 :] = ego.own_then
 
 
@@ -99,10 +99,11 @@ def _others(scene: Scene) -> Array:
 
 @dataclass(frozen=True)
 class Pucks(Observable):
-    """Position, velocity and spin of every puck, or its sensed history.
+    """Position, velocity and spin of every puck (now: by free flight), or its history.
 
-    An estimate has visibility and age (s) of the newest frame besides. The spin is the
-    speed of the edge, radius times angular velocity, counter-clockwise.
+    What would be now is there with a reaction, see `reckoning.reckon`. An estimate has
+    visibility and age (s) of the newest frame besides. The spin is the speed of the
+    edge, radius times angular velocity, counter-clockwise.
     """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
@@ -117,21 +118,27 @@ class Pucks(Observable):
             columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
             most = PUCK_SPEED_CAP
             columns.append(Column(f"puck_{i}.spin", -most, most, 0.5))
+            if scope.reckons:
+                columns += scope.position_columns(f"puck_{i}.now", (0.67, 0.25))
+                columns += scope.velocity_columns(f"puck_{i}.now", most, 1.4)
             if scope.observe == "estimate":
                 columns += _frame_columns(f"puck_{i}")
         return columns
 
     def write(self, ego: EgoView, out: Array) -> None:
         if ego.scope.observe != "history":
-            estimate = ego.scope.observe == "estimate"
-            size = 7 if estimate else 5
-            for i in range(ego.scope.scene.pucks):
+            pucks = ego.scope.scene.pucks
+            size, (place, motion) = out.shape[-1] // pucks, ego.puck_now
+            for i in range(pucks):
                 part = out[..., size * i : size * (i + 1)]
                 part[..., :2] = ego.puck[..., i, :]
                 part[..., 2:4] = ego.puck_velocity[..., i, :]
                 part[..., 4] = ego.puck_edge[..., i]
-                if estimate:
-                    part[..., 5:] = ego.history[..., None, -1, i, 2:]
+                if ego.scope.reckons:
+                    part[..., 5:7] = place[..., i, :]
+                    part[..., 7:9] = motion[..., i, :]
+                if ego.scope.observe == "estimate":
+                    part[..., -2:] = ego.history[..., None, -1, i, 2:]
             return
         lead = ego.history.shape[:-3]
         flat = ego.history.swapaxes(-2, -3).reshape(*lead, -1, 4)
@@ -148,14 +155,14 @@ def _frame_columns(name: str) -> list[Column]:
 
 @dataclass(frozen=True)
 class OwnToPucks(Observable):
-    """Vector from the seat's own paddle to every puck."""
+    """Vector from the seat's own paddle to every puck, with a reaction both as now."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         names = [f"own_to_puck_{i}" for i in range(scope.scene.pucks)]
         return [c for name in names for c in scope.offset_columns(name, (0.25, 0.125))]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        out[...] = (ego.puck - ego.own[..., None, :]).reshape(out.shape)
+        out[...] = (ego.puck_now[0] - ego.own[..., None, :]).reshape(out.shape)
 
 
 @dataclass(frozen=True)

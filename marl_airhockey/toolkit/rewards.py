@@ -1,4 +1,4 @@
-"""Rewards: measures of a transition, with those of touches, lifts and possession.
+"""Rewards: measures of a transition, with those of touches, lifts, possession, saves.
 
 All functions are pure and vectorised over the caller's leading axes.
 """
@@ -20,6 +20,7 @@ from marl_airhockey.toolkit.possession import held as held
 from marl_airhockey.toolkit.possession import in_reach as in_reach
 from marl_airhockey.toolkit.possession import last_toucher as last_toucher
 from marl_airhockey.toolkit.possession import lying as lying
+from marl_airhockey.toolkit.saves import saves as saves
 from marl_airhockey.types import Array
 
 

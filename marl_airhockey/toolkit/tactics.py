@@ -15,7 +15,7 @@ from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
-from marl_airhockey.core.parameters import PARAMETERS
+from marl_airhockey.core.reckoning import Walls, reckon
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
@@ -72,10 +72,8 @@ class Field:
     """Largest |y| of a shot at the own goal (m)."""
     targets: Array
     """Points in the goals of other teams (T, 2), m; empty without any."""
-    restitution: float
-    """Restitution of the walls that it counts on, at 1 m/s."""
-    friction: float
-    """Friction of the walls that it counts on."""
+    walls: Walls
+    """Walls, as it counts on them."""
 
     @staticmethod
     def of(scene: Scene, seat: int) -> Field:
@@ -98,26 +96,25 @@ class Field:
         box = len(table.vertices) == 4 and me.side in (0, 2)
         half = float(table.size[1]) / 2 - table.puck_radius if box else np.inf
         targets = np.array(points).reshape(-1, 2) @ rotation.T
-        laws = {k: PARAMETERS[k].default for k in ("wall_restitution", "wall_friction")}
-        laws = {k: scene.defaults.get(k, laws[k]) for k in laws}
         edge = -float(table.offsets[me.side])
-        return Field(edge, half, keep, targets, *laws.values())
+        return Field(edge, half, keep, targets, Walls.of(scene).rotated(rotation))
+
+    @property
+    def sides(self) -> tuple[float, float, float]:
+        """`half` (m), restitution and friction of the long walls."""
+        return self.half, self.walls.restitution, self.walls.friction
 
 
 def nearest_puck(view: View, field: Field, lag: float) -> tuple[Array, Array]:
     """Reckon place and velocity (W, 2) of the puck that is, or will be, nearest.
 
-    Pucks are brought forward over the reaction of the game, less ``lag``, along the
-    long walls and past all paddles; a longer lag takes them straight back.
+    Pucks are brought forward over the reaction of the game, less ``lag``, see
+    `reckoning.reckon`; a longer lag takes them straight back.
     """
     place, motion = view.state.puck, view.state.puck_velocity
     ahead = view.reaction - lag
     if ahead > 0.0:
-        shape, laws = place.shape, (field.half, field.restitution, field.friction)
-        time = np.full(shape[0] * shape[1], ahead)
-        moved = _slide_on(place.reshape(-1, 2), motion.reshape(-1, 2), time, *laws)
-        place = moved[:, :2].reshape(shape)
-        motion = moved[:, 2:].reshape(shape)
+        place, motion = reckon(place, motion, ahead, field.walls)
     else:
         place = place + ahead * motion
     which = (place[..., 0] + 0.4 * motion[..., 0]).argmin(-1)
@@ -139,8 +136,7 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
     due = np.clip((place[:, 0] - line) / np.maximum(-motion[:, 0], 0.3), 0.0, 0.6)
     wide = min(np.abs(view.reach[:, 1]).max(), field.keep)
     due = np.where(motion[:, 0] < 0.0, due, 0.0)
-    laws = field.half, field.restitution, field.friction
-    aside = _slide_on(place, motion, due, *laws)[:, 1]
+    aside = _slide_on(place, motion, due, *field.sides)[:, 1]
     return np.stack([np.full_like(aside, line), np.clip(aside, -wide, wide)], -1)
 
 
@@ -158,12 +154,8 @@ def _moved(
     half: float,
     restitution: float,
     friction: float,
-) -> tuple[float, float, float, float]:
-    """Move a puck without spin and drag on by a time, long walls or not.
-
-    Returns:
-        Place, m, and velocity, m/s.
-    """
+) -> tuple[float, float]:
+    """Return the place of a puck without spin and drag after a time, m."""
     for _ in range(4):
         wall = half if vy > 0.0 else -half
         due = max((wall - y) / vy, 0.0) if vy != 0.0 else np.inf
@@ -172,7 +164,7 @@ def _moved(
         x, y, time = x + vx * due, wall, time - due
         push = impulse(abs(vy), vx, restitution, friction, 1.0, 3.0)[1]
         vx, vy = vx + push, -restitution * vy
-    return x + vx * time, y + vy * time, vx, vy
+    return x + vx * time, y + vy * time
 
 
 @njit(cache=True, error_model="numpy")
@@ -184,11 +176,12 @@ def _slide_on(
     restitution: float,
     friction: float,
 ) -> Array:
-    """Return places and velocities (W, 4) of pucks after some times (W,), s."""
-    out = np.empty((len(place), 4))
+    """Return places (W, 2) of pucks after some times (W,), s."""
+    out = np.empty_like(place)
     for w in range(len(out)):
         x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
-        out[w] = _moved(x, y, vx, vy, time[w], half, restitution, friction)
+        moved = _moved(x, y, vx, vy, time[w], half, restitution, friction)
+        out[w, 0], out[w, 1] = moved
     return out
 
 
@@ -217,7 +210,7 @@ def _find_strike(
         due[w] = np.inf
         for moment in np.arange(0.0, HORIZON + 0.5 * STEP, STEP):
             x, y, vx, vy = place[w, 0], place[w, 1], motion[w, 0], motion[w, 1]
-            x, y, _, _ = _moved(x, y, vx, vy, moment, half, restitution, friction)
+            x, y = _moved(x, y, vx, vy, moment, half, restitution, friction)
             ox, oy = aim[w, 0] - x, aim[w, 1] - y
             size = max(np.sqrt(ox * ox + oy * oy), 1e-6)
             ox, oy = ox / size, oy / size
@@ -258,9 +251,8 @@ def attack(
     touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
     low, high = view.reach.min(0), view.reach.max(0)
 
-    laws = field.half, field.restitution, field.friction
     due, there, way = _find_strike(
-        place, motion, own, speed, aim, low, high, touch, *laws
+        place, motion, own, speed, aim, low, high, touch, *field.sides
     )
     contact = there - way * touch
     gap = contact - own

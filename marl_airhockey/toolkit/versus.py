@@ -21,14 +21,16 @@ from marl_airhockey.types import Array, Memory
 class Versus(Scenario):
     """Game in which a goal pays a team 1 and costs the other 1.
 
-    The first team with ``goals_to_win`` goals wins. After a goal the puck is served
-    from the centre toward the team that conceded it. Keeping it within reach for
-    ``possession`` seconds is a foul: a serve to the other side. A puck at rest out of
-    every reach is served again.
+    The first team with ``goals_to_win`` goals, and more than the other, wins. After a
+    goal the puck is served from the centre toward the team that conceded it. Keeping it
+    within reach for ``possession`` seconds is a foul: a serve to the other side. A puck
+    at rest out of every reach is served again. A level game that the clock ends goes to
+    the team with more shots on goal, so who attacks wins it, not who passes time.
     """
 
     seats: str = "arcade"
     seconds: float = 60.0
+    reaction: float = 0.15
     goals_to_win: int = 7
     """Number of goals that wins."""
     pucks: int = 1
@@ -37,6 +39,10 @@ class Versus(Scenario):
     """Width of the goal lines (m)."""
     possession: float = 5.0
     """Longest time that a team may have a puck in its reach (s)."""
+    scored_weight: float = 1.0
+    """Reward of a goal; to concede one costs 1."""
+    shot_weight: float = 0.0
+    """Reward of a shot on goal that was stopped; its cost for who stopped it."""
     jitter_weight: float = 0.0
 
     @property
@@ -78,6 +84,8 @@ class Versus(Scenario):
         return {
             **super().initial_memory(state, rng),
             "goals": np.zeros((worlds, 2)),
+            "stopped": np.zeros((worlds, 2)),
+            "toucher": np.zeros((worlds, pucks)),
             "held": np.zeros((worlds, seats, pucks)),
             "lying": np.zeros((worlds, pucks)),
             "serve": np.zeros((worlds, pucks)),
@@ -94,8 +102,13 @@ class Versus(Scenario):
         again |= foul.all(-2)
         nearer = np.where(t.after.puck[..., 0] < 0.0, -1.0, 1.0)
         serve = np.where(again, nearer, toward)
+        stopped = rewards.saves(self.scene, t, t.memory["toucher"]).sum(-2)
+        ours = [stopped[..., self.teams == team].sum(-1) for team in (0, 1)]
+        toucher = rewards.last_toucher(t.memory["toucher"], t.after)
         return {
             "goals": t.memory["goals"] + t.after.crossed[..., ::-1].sum(-2),
+            "stopped": t.memory["stopped"] + np.stack(ours, -1),
+            "toucher": np.where(serve != 0.0, 0.0, toucher),
             "held": np.where((serve != 0.0)[..., None, :], 0.0, held),
             "lying": np.where(serve != 0.0, 0.0, lying),
             "serve": serve,
@@ -114,13 +127,33 @@ class Versus(Scenario):
     def reward_terms(self, t: Transition) -> dict[str, Array]:
         """Return the terms.
 
-        goal: 1 for each goal of the seat's team, -1 for each of the other's.
+        goal: ``scored_weight`` for each goal of its team, -1 for each of the other's.
+        shot: ``shot_weight`` for each shot on goal of its team that was stopped, and
+        minus that for each of the other's.
         """
         scored = t.new_memory["goals"] - t.memory["goals"]
-        return {"goal": (scored - scored[..., ::-1])[..., self.teams]}
+        goal = self.scored_weight * scored - scored[..., ::-1]
+        terms = {"goal": goal[..., self.teams]}
+        if self.shot_weight:
+            shots = t.new_memory["stopped"] - t.memory["stopped"]
+            shot = self.shot_weight * (shots - shots[..., ::-1])
+            terms["shot"] = shot[..., self.teams]
+        return terms
+
+    def _leads(self, memory: Memory) -> Array:
+        """(..., 2) bool: the team has more goals or, as many, more shots on goal.
+
+        At most one of both does.
+        """
+        goals, stopped = memory["goals"], memory["stopped"]
+        level = goals == goals[..., ::-1]
+        more = stopped > stopped[..., ::-1]
+        return np.asarray((goals > goals[..., ::-1]) | (level & more))
 
     def terminated(self, t: Transition) -> Array:
-        return np.asarray((t.new_memory["goals"] >= self.goals_to_win).any(-1))
+        goals = t.new_memory["goals"]
+        won = (goals >= self.goals_to_win) & (goals > goals[..., ::-1])
+        return np.asarray(won.any(-1))
 
     def needs_serve(self, t: Transition) -> Array:
         return np.asarray((t.new_memory["serve"] != 0.0).any(-1))
@@ -138,8 +171,11 @@ class Versus(Scenario):
         return "goals " + " : ".join(f"{goals:.0f}" for goals in memory["goals"])
 
     def success(self, t: Transition) -> Array:
-        """(..., seats) bool: the team has ``goals_to_win``, or leads as time ends."""
-        goals = t.new_memory["goals"]
-        ahead = t.last[..., None] & (goals > goals[..., ::-1])
-        won = (goals >= self.goals_to_win) | ahead
-        return np.asarray(won[..., self.teams])
+        """(..., seats) bool: the team leads when goals or the clock end the game.
+
+        It has more goals or, of as many, more shots on goal.
+        """
+        over = self.terminated(t) | t.last
+        return np.asarray(
+            (over[..., None] & self._leads(t.new_memory))[..., self.teams]
+        )

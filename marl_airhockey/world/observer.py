@@ -65,9 +65,9 @@ class Observer:
         self.sensor.estimates |= observe == "estimate"
         if observe not in self._layouts:
             form = "velocity" if observe == "pixels" else observe
-            late = self._perception is not None
-            top = self._top_speed
-            scope = ObservationContext(self.scenario.scene, form, top, late)
+            scope = ObservationContext(
+                self.scenario.scene, form, self._top_speed, self.reaction
+            )
             apart = self.scenario.goals == "dict"
             observables = tuple(
                 p for p in self.scenario.observation if not (apart and p.goal)
@@ -208,7 +208,7 @@ class Observer:
         """Return the numbers of a layout, and the goals beside it."""
         game = self.scenario
         paddle = state.paddle, state.paddle_velocity
-        if layout.scope.late:
+        if layout.scope.reaction:
             paddle = past["place"], past["motion"]
         sensed = past["history"], past["asked"]
         ego = EgoView(state, memory, *sensed, paddle, layout.scope)

@@ -43,3 +43,11 @@ def test_policies_for_robots_learn_with_faster_servos_than_they_are_measured_wit
     assert preset("juggle").training_keywords == preset("juggle").keywords
     with pytest.raises(ValueError, match="unknown profile 'robot'"):
         preset("juggle", {"profile": "robot"})
+
+
+def test_shots_are_paid_in_training_alone():
+    config = preset("duel")
+    assert config.training_keywords["options"]["shot_weight"] > 0.0
+    assert "shot_weight" not in config.keywords["options"]
+    given = preset("duel", {"options": {"shot_weight": 0.0}})
+    assert given.training_keywords["options"] == {"shot_weight": 0.0}

@@ -46,6 +46,36 @@ def test_learners_and_opponents_share_an_environment(tmp_path):
     assert env.scores["random"] != 0.5
 
 
+def test_opponents_move_slower_in_half_of_the_games_that_do_not_count(tmp_path):
+    alone = {"mirror": 0.0, "script_share": 1.0, "num_worlds": 64}
+    _, env = training_env(tmp_path, opponents=["random"], opponent_pace=0.2, **alone)
+    env.reset()
+    pace = env._pace.copy()
+    assert 16 < (pace == 1.0).sum() < 48
+    assert (pace >= 0.2).all()
+    assert pace.min() < 0.4
+    idle = np.zeros((env.num_envs, 2))
+    most = np.zeros(64)
+    for _ in range(20):
+        env.step_async(idle)
+        theirs = env._roster.seated >= 0
+        most = np.maximum(most, np.abs(env._actions * theirs[..., None]).max((1, 2)))
+        assert not env._actions[~theirs].any()
+        env.step_wait()
+    assert (most <= pace).all()
+    assert (most > 0.7 * pace).all()
+    # Only worlds whose opponents play at full pace change the score.
+    last = env.world.step(np.zeros((64, 4, 2)))
+    last.success[:], before = False, env._scores.copy()
+    env._pace[:] = 0.5
+    env._restarted(np.arange(64), last)
+    np.testing.assert_array_equal(env._scores, before)
+    env._pace[:] = 1.0
+    last.success[np.arange(64)[:, None], env._members[env._learner]] = True
+    env._restarted(np.arange(64), last)
+    assert (env._scores > before).all()
+
+
 def test_hard_opponents_come_more_often(tmp_path):
     _, env = training_env(tmp_path, opponents=["random", "goalkeeper"])
     env._scores[:] = 0.95, 0.2

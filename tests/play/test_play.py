@@ -157,7 +157,7 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
         ("duel", {"options": {"pucks": 2}}, []),
         (
             "duel",
-            {"options": {"seats": "robot"}, "profile": "ur5e"},
+            {"options": {"seats": "robot", "reaction": 0.0}, "profile": "ur5e"},
             ["zoo/duel_robot"],
         ),
         ("free_for_all", {"options": {"sides": 3}}, []),

@@ -21,8 +21,17 @@ def test_a_goal_in_a_duel_pays_and_is_served_to_who_conceded(backend):
     assert len(np.unique(angle)) == 4
 
 
+def test_goals_can_be_worth_less_than_those_conceded(backend):
+    options = {"scored_weight": 0.25}
+    world = ah.make_world("duel", 2, backend=backend, options=options)
+    world.reset(0)
+    place_puck(world, 0.75, 0.0, 2.0)
+    assert sum(s.reward for s in idle(world, 0.2)).tolist() == [[0.25, -1.0]] * 2
+
+
 def test_holding_the_puck_in_a_duel_is_a_foul_and_a_dead_puck_is_served(backend):
-    world = ah.make_world("duel", 2, backend=backend)
+    prompt = {"reaction": 0.0}
+    world = ah.make_world("duel", 2, backend=backend, options=prompt)
     world.reset(0)
     place_puck(world, -0.3, 0.15)
     steps = idle(world, 4.95)
@@ -55,6 +64,82 @@ def test_a_duel_ends_at_seven_goals_and_the_better_has_won(backend):
     assert world.episode.success.tolist() == [[False, True]] * 2
     assert reward.tolist() == [[-2.0, 2.0]] * 2
     assert world.memory["goals"].tolist() == [[0.0, 2.0]] * 2
+
+
+@pytest.mark.parametrize("name", ["duel", "doubles"])
+@pytest.mark.parametrize("cycles", [1, 40])
+def test_a_level_game_goes_to_who_had_more_shots_on_goal(name, cycles, backend):
+    world = ah.make_world(name, 4, backend=backend, max_cycles=cycles)
+    world.autoreset = False
+    world.reset(0)
+    rows, kept = world.get_state()
+    rows.puck_velocity[:], rows.puck[:, 0] = 0.0, (-0.3, 0.2)
+    kept["stopped"][:] = [(1, 0), (3, 4), (2, 2), (0, 5)]
+    kept["goals"][3] = (1, 0)  # goals come first
+    world.set_state(rows, kept)
+    steps = idle(world, cycles * world.control_dt)
+    assert steps[-1].truncated.all()
+    assert not any(step.success.any() for step in steps[:-1])
+    team = world.scenario.teams
+    winner = np.array([0, 1, -1, 0])
+    np.testing.assert_array_equal(world.episode.success, team == winner[:, None])
+
+
+@pytest.mark.parametrize(
+    ("toucher", "x", "y", "speed", "counts"),
+    [
+        (2, -0.3, 0.05, 3.0, 1.0),
+        (2, -0.3, 0.05, 0.9, 0.0),
+        (1, -0.3, 0.05, 3.0, 0.0),
+        (0, -0.3, 0.05, 3.0, 0.0),
+        (2, -0.3, 0.2, 3.0, 0.0),
+    ],
+)
+def test_a_shot_on_goal_that_is_stopped_counts(toucher, x, y, speed, counts, backend):
+    options = {"shot_weight": 0.1}
+    world = ah.make_world("duel", 2, backend=backend, options=options)
+    world.reset(0)
+    rows, kept = world.get_state()
+    rows.paddle[:, 0], rows.velocity[:, 0] = (x, y), 0.0
+    rows.puck[:, 0], rows.puck_velocity[:, 0] = (x + 0.2, y), (-speed, 0.0)
+    kept["toucher"][:] = toucher
+    world.set_state(rows, kept)
+    steps = idle(world, 0.25)
+    assert (world.memory["touches"][:, 0] > 0).all(), "it was stopped"
+    assert (world.memory["stopped"] == [0.0, counts]).all()
+    paid = sum(step.reward for step in steps)
+    np.testing.assert_allclose(paid, [[-0.1 * counts, 0.1 * counts]] * 2)
+
+
+def test_two_goals_at_once_name_no_two_winners(backend):
+    options = {"pucks": 2, "goals_to_win": 3}
+    world = ah.make_world("duel", 2, backend=backend, options=options)
+    world.autoreset = False
+    world.reset(0)
+    for goals in (1, 2, 3):
+        rows, kept = world.get_state()
+        rows.puck[:] = [(0.97, 0.0), (-0.97, 0.0)]
+        rows.puck_velocity[:] = [(3.0, 0.0), (-3.0, 0.0)]
+        world.set_state(rows, kept)
+        step = idle(world, world.control_dt)[0]
+        assert (world.memory["goals"] == goals).all()
+        assert not step.terminated.any()
+        assert not world.episode.success.any()
+    place_puck(world, 0.97, 0.0, 3.0)
+    assert idle(world, world.control_dt)[0].terminated.all()
+    assert world.episode.success.tolist() == [[True, False]] * 2
+
+
+@pytest.mark.parametrize("x", [0.0, 0.04, -0.04])
+def test_a_puck_that_rests_between_two_paddles_is_served_again(x, backend):
+    world = ah.make_world("duel", 2, backend=backend)
+    world.reset(0)
+    place_puck(world, x, 0.2)
+    idle(world, 4.95)
+    np.testing.assert_allclose(world.state.puck[:, 0], [[x, 0.2]] * 2, atol=1e-6)
+    idle(world, 0.05)
+    np.testing.assert_allclose(world.state.puck[:, 0], 0.0)
+    assert (np.abs(world.state.puck_velocity[:, 0, 0]) > 0.45).all()
 
 
 GAMES = {"duel": 2, "doubles": 2, "rally": 2, "free_for_all": 4}
@@ -133,6 +218,38 @@ def test_lives_are_lost_goals_close_and_the_last_one_wins(backend, sides):
     assert world.episode.success.tolist() == [winners] * 3
 
 
+def test_the_clock_ends_a_free_for_all_with_one_winner(backend):
+    options = {"sides": 3}
+    world = ah.make_world("free_for_all", 4, backend=backend, options=options)
+    world.autoreset, world.max_cycles = False, 5
+    world.reset(0)
+    lives = [(1, 2, 2), (3, 1, 2), (2, 2, 2), (2, 2, 2)]
+    shots = [(9, 1, 2), (0, 9, 9), (3, 4, 3), (5, 5, 5)]
+    rows, kept = world.get_state()
+    rows.puck_velocity[:] = 0.0
+    rows.puck[:, 0] = -0.2 * world.scene.table.normals[2]
+    kept["lives"][:], kept["shots"][:] = lives, shots
+    world.set_state(rows, kept)
+    steps = idle(world, 0.25)
+    assert steps[-1].truncated.all()
+    assert not any(step.success.any() for step in steps[:-1])
+    expected = [*np.eye(3, dtype=bool)[[2, 0, 1]].tolist(), [False] * 3]
+    assert world.episode.success.tolist() == expected
+
+
+def test_a_puck_that_rests_before_a_seat_that_is_out_is_served_again(backend):
+    world = ah.make_world("free_for_all", 2, backend=backend)
+    world.reset(0)
+    rows, kept = world.get_state()
+    rows.puck[:, 0] = -0.25 * world.scene.table.normals[2]
+    rows.puck_velocity[:] = 0.0
+    kept["lives"][:, 2] = 0.0
+    world.set_state(rows, kept)
+    idle(world, 1.0)
+    np.testing.assert_allclose(world.state.puck[:, 0], 0.0, atol=1e-9)
+    assert (np.hypot(*world.state.puck_velocity[:, 0].T) > 0.45).all()
+
+
 def test_a_goal_pays_who_touched_the_puck_last(backend):
     world = ah.make_world("free_for_all", 2, backend=backend)
     world.reset(0)
@@ -155,13 +272,39 @@ def test_a_rally_counts_alternating_crossings(backend):
     world.reset(0)
     place_puck(world, -0.2, 0.2, 1.0)
     assert not sum(s.reward for s in idle(world, 0.5)).any(), "nobody had struck it"
-    for toucher, paid in ((1, 1.0), (1, 0.0), (2, 1.0), (1, 1.0)):
+    # From an end, but not twice by one seat, and not from near the middle.
+    for toucher, x, paid in (
+        (1, 0.4, 1.0),
+        (1, 0.4, 0.0),
+        (2, 0.4, 1.0),
+        (1, 0.25, 0.0),
+        (1, 0.4, 1.0),
+    ):
         heading = 1.0 if toucher == 1 else -1.0
-        place_puck(world, -0.1 * heading, 0.2, heading, toucher=toucher)
-        reward = sum(s.reward for s in idle(world, 0.3))
+        place_puck(world, -x * heading, 0.2, 1.5 * heading, toucher=toucher, deep=0.0)
+        reward = sum(s.reward for s in idle(world, 0.35))
         assert reward.tolist() == [[paid, paid]] * 2
     place_puck(world, -0.1, 0.2, 0.04)
     assert idle(world, 0.05)[0].terminated.all()
+
+
+@pytest.mark.parametrize(("x", "paid"), [(-0.36, 1.0), (-0.2, 0.0)])
+def test_a_fast_rally_counts_where_the_puck_was_struck(x, paid, backend):
+    world = ah.make_world("rally", 2, backend=backend)
+    world.autoreset = False
+    world.reset(0)
+    # Struck there in the middle of a step, it is nearer to the middle before and after.
+    rows, kept = world.get_state()
+    gap = world.scene.table.paddle_radius + world.scene.table.puck_radius
+    half = world.control_dt / 2
+    rows.paddle[:, 0], rows.velocity[:, 0] = (x - gap - 4.9 * half, 0.2), (4.9, 0.0)
+    rows.puck[:, 0], rows.puck_velocity[:, 0] = (x + 7.0 * half, 0.2), (-7.0, 0.0)
+    world.set_state(rows, kept)
+    action = np.tile([[1.0, 0.0], [0.0, 0.0]], (2, 1, 1))
+    reward = sum(world.step(action).reward for _ in range(4))
+    assert (world.memory["toucher"] == 1.0).all()
+    assert (world.state.puck[:, 0, 0] > 0.0).all()
+    assert reward.tolist() == [[paid, paid]] * 2
 
 
 def test_mates_are_paid_for_striking_alternately(backend):

@@ -1,0 +1,57 @@
+"""Command ``airhockey challenge``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from marl_airhockey import __version__
+from marl_airhockey.cli.options import AsJson, Trusting, app, bar, console
+from marl_airhockey.core.errors import require
+from marl_airhockey.evaluation.card import Result
+from marl_airhockey.evaluation.challenge import (
+    FIELD,
+    PROFILES,
+    TASKS,
+    play_challenge,
+)
+
+
+@app.command()
+def challenge(
+    policy: Annotated[
+        str,
+        typer.Argument(
+            help="A driver, a policy, a folder of policies by task (juggle.npz, "
+            "juggle_ur5e.npz), or zoo."
+        ),
+    ],
+    name: Annotated[
+        str | None, typer.Option(help="Name on the card; else POLICY.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the card.")] = Path(
+        "runs/challenge"
+    ),
+    trust: Trusting = False,
+    as_json: AsJson = False,
+) -> None:
+    """Play the ten tasks in three profiles and duels: one card to compare."""
+    require("matplotlib", "train")
+    with bar() as progress:
+        total = len(TASKS) * len(PROFILES) + len(FIELD)
+        task = progress.add_task("challenge", total=total, note="")
+
+        def report(result: Result) -> None:
+            """Show the progress."""
+            what = f"{result.scenario} {result.rival or result.profile}"
+            progress.update(task, advance=1, note=f"{what} {result.score:.2f}")
+
+        card = play_challenge(policy, name or policy, __version__, report=report)
+    files = card.save(out)
+    if as_json:
+        console.print_json(card.to_json())
+        return
+    console.print(card.to_markdown(), markup=False)
+    console.print("files:", *files)

@@ -1,0 +1,61 @@
+"""Command ``airhockey crossplay``."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import (
+    AsJson,
+    Backend,
+    Drivers,
+    Options,
+    Profile,
+    Trusting,
+    app,
+    console,
+    environment,
+)
+from marl_airhockey.evaluation.crossplay import CrossPlay, play_together
+from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+
+
+@app.command()
+def crossplay(
+    scenario: Annotated[str, typer.Argument(help="A game of teams of two or more.")],
+    players: Annotated[list[str], typer.Argument(help="Drivers and policies.")],
+    episodes: Annotated[int, typer.Option(help="Of each pair.", min=1)] = 200,
+    backend: Backend = DEFAULT_BACKEND,
+    profile: Profile = "ideal",
+    option: Options = None,
+    driver: Drivers = None,
+    trust: Trusting = False,
+    as_json: AsJson = False,
+) -> None:
+    """Let players play with mates that they do not know: the coordination gap."""
+    keywords = environment(backend, profile, option, driver)
+    mates = {name: make_agent(name) for name in players}
+    found = play_together(scenario, mates, episodes, keywords=keywords)
+    if as_json:
+        console.print_json(json.dumps(found.to_json()))
+        return
+    console.print(table(found))
+    low, high = found.gap_interval
+    console.print(
+        f"with itself {found.self_play:.2f}, with others {found.cross_play:.2f}, "
+        f"gap {found.gaps.mean():.2f} ({low:.2f}..{high:.2f})"
+    )
+
+
+def table(found: CrossPlay) -> Table:
+    """Return the returns of all pairs, success in brackets; mates are columns."""
+    shown = Table("player", *found.names, title="return (success) with the mate")
+    for name, returns, success in zip(
+        found.names, found.returns, found.success, strict=True
+    ):
+        pairs = zip(returns, success, strict=True)
+        shown.add_row(name, *(f"{value:.2f} ({share:.2f})" for value, share in pairs))
+    return shown

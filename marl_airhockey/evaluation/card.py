@@ -1,0 +1,177 @@
+"""Card of a player: its results in the challenge, as JSON, Markdown and a picture."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+PROTOCOL = 1
+"""Raised whenever the challenge changes: cards of others are not comparable"""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result in one task and profile, or against one opponent."""
+
+    scenario: str
+    profile: str
+    rival: str
+    """Opponent; "" in a task"""
+    player: str
+    """Who played; "" if nobody did"""
+    score: float
+    """Success; of a duel the share of won games, a draw being half"""
+    low: float
+    high: float
+    """95 % interval of the score"""
+    first_shot: float
+    """Share of episodes that succeeded before a second distinct touch; 0 in duels"""
+    deployability: str
+    """Grade A to D of a task; "" in duels"""
+    note: str
+    """Why it was not played"""
+
+
+@dataclass(frozen=True)
+class Card:
+    """Card of a player: all results of the protocol."""
+
+    name: str
+    version: str
+    """Version of the library"""
+    episodes: int
+    """Number of episodes of each task and profile"""
+    games: int
+    """Number of games against each opponent"""
+    files: dict[str, str]
+    """SHA-256 of the policies' files, by name"""
+    results: tuple[Result, ...]
+    protocol: int = PROTOCOL
+
+    @property
+    def profiles(self) -> list[str]:
+        """Profiles in which tasks were played."""
+        return list(dict.fromkeys(r.profile for r in self.results if not r.rival))
+
+    def total(self, keep: Callable[[Result], bool]) -> tuple[float, float, float]:
+        """Return the mean score of some results, and its 95 % interval.
+
+        The interval adds those of the results as independent errors.
+        """
+        kept = [result for result in self.results if keep(result)]
+        mean = float(np.mean([result.score for result in kept]))
+        errors = [(r.score - r.low, r.high - r.score) for r in kept if r.player]
+        down, up = np.sqrt(np.square([(0.0, 0.0), *errors]).sum(0)) / len(kept)
+        return mean, mean - float(down), mean + float(up)
+
+    @property
+    def totals(self) -> dict[str, tuple[float, float, float]]:
+        """Means with intervals: of each profile's tasks, all tasks, and duels."""
+        found = {}
+        for profile in self.profiles:
+            in_it = partial(_is_task, profile=profile)
+            found[profile] = self.total(in_it)
+        found["tasks"] = self.total(lambda r: not r.rival)
+        found["duel"] = self.total(lambda r: bool(r.rival))
+        return found
+
+    def to_json(self) -> str:
+        """Return the card as JSON."""
+        data = asdict(self)
+        data["totals"] = self.totals
+        return json.dumps(data, indent=1)
+
+    @staticmethod
+    def from_json(text: str) -> Card:
+        """Read what `to_json` wrote.
+
+        Raises:
+            ValueError: no card, or one of another protocol.
+        """
+        try:
+            data = json.loads(text)
+            data.pop("totals")
+            data["results"] = tuple(Result(**row) for row in data["results"])
+            card = Card(**data)
+        except (KeyError, TypeError, json.JSONDecodeError) as error:
+            raise ValueError(f"this is no card of a challenge: {error}") from error
+        if card.protocol != PROTOCOL:
+            raise ValueError(
+                f"a card of protocol {card.protocol}, this is {PROTOCOL}: play anew"
+            )
+        return card
+
+    def to_markdown(self) -> str:
+        """Return the card as Markdown."""
+        lines = [
+            f"# {self.name}",
+            "",
+            f"marl_airhockey {self.version}, protocol {self.protocol}: {self.episodes} "
+            f"episodes of each task and profile, {self.games} games of each duel.",
+            "",
+            "| part | score | 95 % |",
+            "| --- | --- | --- |",
+        ]
+        lines += [
+            f"| {part} | {mean:.3f} | {low:.3f}..{high:.3f} |"
+            for part, (mean, low, high) in self.totals.items()
+        ]
+        head = "| task | profile | player | success (95 %) | first shot | deployable |"
+        lines += ["", head, "| --- " * 6 + "|"]
+        lines += [
+            f"| {r.scenario} | {r.profile} | {r.player or r.note} | {_share(r)} | "
+            f"{r.first_shot:.3f} | {r.deployability} |"
+            for r in self.results
+            if not r.rival
+        ]
+        lines += ["", "| duel against | player | score (95 %) |", "| --- " * 3 + "|"]
+        lines += [
+            f"| {r.rival} | {r.player or r.note} | {_share(r)} |"
+            for r in self.results
+            if r.rival
+        ]
+        return "\n".join(lines) + "\n"
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write card.json, card.md and card.png; return them."""
+        folder.mkdir(parents=True, exist_ok=True)
+        files = [folder / f"card.{kind}" for kind in ("json", "md", "png")]
+        files[0].write_text(self.to_json())
+        files[1].write_text(self.to_markdown())
+        plot_card(self, files[2])
+        return files
+
+
+def _is_task(result: Result, profile: str) -> bool:
+    return not result.rival and result.profile == profile
+
+
+def _share(result: Result) -> str:
+    return f"{result.score:.3f} ({result.low:.2f}..{result.high:.2f})"
+
+
+def plot_card(card: Card, path: Path) -> None:
+    """Draw the success in each task, a line for each profile, as a radar plot."""
+    import matplotlib.pyplot as plt
+
+    from marl_airhockey.evaluation.charts import DPI, INK, INKS, save
+
+    tasks = list(dict.fromkeys(r.scenario for r in card.results if not r.rival))
+    angles = np.linspace(0.0, 2.0 * np.pi, len(tasks), endpoint=False)
+    figure, axes = plt.subplots(
+        figsize=(6.4, 6.0), dpi=DPI, layout="constrained", subplot_kw={"polar": True}
+    )
+    for profile, ink in zip(card.profiles, (INK, *INKS), strict=False):
+        share = [r.score for r in card.results if not r.rival and r.profile == profile]
+        axes.plot([*angles, angles[0]], [*share, share[0]], color=ink, label=profile)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_xticks(angles, [task.replace("_", "\n") for task in tasks], size=8)
+    axes.tick_params(axis="x", pad=12)
+    axes.set_title(f"{card.name}: success", pad=24)
+    axes.legend(frameon=False, loc="lower left", bbox_to_anchor=(-0.12, -0.08))
+    save(figure, path)

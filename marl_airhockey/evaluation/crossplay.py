@@ -1,0 +1,109 @@
+"""Cross-play: how well players do with mates that they were not trained with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
+from marl_airhockey.evaluation.stats import bootstrap
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, scenario_of
+
+
+@dataclass(frozen=True)
+class CrossPlay:
+    """Results of E players in teams: the row's at ``paddle_0``, the column's its mates.
+
+    On the diagonal a player meets itself (self-play).
+    """
+
+    scenario: str
+    names: tuple[str, ...]
+    episodes: int
+    """Number of episodes of each pair"""
+    returns: Array
+    """(E, E) mean return"""
+    success: Array
+    """(E, E) share of episodes with success"""
+
+    @property
+    def self_play(self) -> float:
+        """Mean return of players with themselves."""
+        return float(np.diag(self.returns).mean())
+
+    @property
+    def cross_play(self) -> float:
+        """Mean return of players with others."""
+        return float(self.returns[~np.eye(len(self.names), dtype=bool)].mean())
+
+    @property
+    def gaps(self) -> Array:
+        """(E,) what each player's return loses with others, in both roles.
+
+        Their mean is the zero-shot coordination gap (Hu and others, 2020).
+        """
+        count = len(self.names)
+        own = np.diag(self.returns)
+        with_others = (self.returns + self.returns.T).sum(-1) - 2.0 * own
+        return np.asarray(own - with_others / (2.0 * (count - 1)))
+
+    @property
+    def gap_interval(self) -> tuple[float, float]:
+        """95 % interval of the mean gap, by bootstrap over the players."""
+        return bootstrap(self.gaps, lambda gaps: float(gaps.mean()))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all numbers as a JSON object."""
+        return {
+            "scenario": self.scenario,
+            "players": list(self.names),
+            "episodes_of_a_pair": self.episodes,
+            "return": self.returns.tolist(),
+            "success": self.success.tolist(),
+            "self_play": self.self_play,
+            "cross_play": self.cross_play,
+            "gap": float(self.gaps.mean()),
+            "gap_interval": list(self.gap_interval),
+        }
+
+
+def play_together(
+    scenario: str,
+    players: Mapping[str, Driver],
+    episodes: int = 200,
+    seed: int = TEST_SEED,
+    keywords: Keywords | None = None,
+) -> CrossPlay:
+    """Let every player play with every other as its mate, and with itself.
+
+    Args:
+        scenario: name of a game whose first team has two seats or more.
+        players: drivers by name, two at least.
+        episodes: number of episodes of each pair, with the same seeds for all.
+        seed: seed of the first one.
+        keywords: keywords of the environment; its drivers fill other teams' seats.
+
+    Raises:
+        ValueError: a single player, a team of one, or a seat without a driver.
+    """
+    keywords = keywords if keywords is not None else {}
+    if len(players) < 2:
+        raise ValueError("cross-play needs at least two players, of different names")
+    seats = scenario_of(scenario, keywords).scene.seats
+    mates = [i for i, s in enumerate(seats) if i and s.team == seats[0].team]
+    if not mates:
+        raise ValueError(f"{scenario!r} has no team of two seats or more")
+    returns, success = np.empty((2, len(players), len(players)))
+    for i, (name, player) in enumerate(players.items()):
+        for j, mate in enumerate(players.values()):
+            team = {f"paddle_{k}": mate for k in mates}
+            drivers = {**keywords.get("drivers", {}), **team}
+            seated: Keywords = {**keywords, "drivers": drivers}
+            found = evaluate(player, name, scenario, episodes, seed, seated)
+            returns[i, j], success[i, j] = found.returns, found.success
+    return CrossPlay(scenario, tuple(players), episodes, returns, success)

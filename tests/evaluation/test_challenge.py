@@ -1,0 +1,72 @@
+"""The protocol by which players are compared, and its card."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from marl_airhockey.evaluation import challenge
+from marl_airhockey.evaluation.card import Card
+from marl_airhockey.evaluation.challenge import find_player, play_challenge
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    """Two tasks, two profiles and one opponent."""
+    monkeypatch.setattr(challenge, "TASKS", ("reach", "touch"))
+    monkeypatch.setattr(challenge, "PROFILES", ("ideal", "ur5e"))
+    monkeypatch.setattr(challenge, "FIELD", ("random",))
+
+
+def test_the_zoo_has_a_card(tmp_path):
+    seen = []
+    card = play_challenge("zoo", "ours", "0", 20, 2, seen.append)
+    assert tuple(seen) == card.results
+    assert [r.player for r in card.results] == [
+        "reach.npz",
+        "touch.npz",
+        "reach_ur5e.npz",
+        "touch_ur5e.npz",
+        "duel.npz",
+    ]
+    assert set(card.files) == {r.player for r in card.results}
+    assert all(r.score >= 0.8 for r in card.results)
+    mean, low, high = card.totals["tasks"]
+    assert mean == pytest.approx(sum(r.score for r in card.results[:4]) / 4)
+    assert low < mean <= high
+    files = card.save(tmp_path)
+    assert Card.from_json(files[0].read_text()) == card
+    assert "| reach | ur5e | reach_ur5e.npz | " in files[1].read_text()
+    assert files[2].stat().st_size > 10_000
+
+
+def test_what_is_not_played_counts_as_nothing():
+    card = play_challenge("reacher", "reacher", "0", 20, 2)
+    reach, touch = card.results[:2]
+    assert reach.score == 1.0
+    assert (touch.score, touch.player) == (0.0, "")
+    assert "no goal to reach" in touch.note
+    assert card.totals["ideal"][0] == 0.5
+    with pytest.raises(ValueError, match="plays none of it"):
+        play_challenge("nobody", "nobody", "0", 2, 2)
+
+
+def test_a_policy_for_a_profile_comes_first(tmp_path):
+    for name in ("juggle.npz", "juggle_ur5e.npz", "touch.onnx"):
+        (tmp_path / name).touch()
+    found = [find_player(str(tmp_path), "juggle", p) for p in ("ideal", "ur5e")]
+    assert [path.rpartition("/")[2] for path in found] == [
+        "juggle.npz",
+        "juggle_ur5e.npz",
+    ]
+    assert find_player(str(tmp_path), "touch", "gantry").endswith("touch.onnx")
+    assert find_player(str(tmp_path), "strike", "ideal") == ""
+    assert find_player("allround", "strike", "ideal") == "allround"
+
+
+def test_cards_of_other_protocols_are_refused():
+    card = replace(play_challenge("reacher", "reacher", "0", 2, 2), protocol=0)
+    with pytest.raises(ValueError, match="protocol 0"):
+        Card.from_json(card.to_json())
+    with pytest.raises(ValueError, match="no card"):
+        Card.from_json(json.dumps({"name": "x"}))
