@@ -1,0 +1,1 @@
+"""Devices: cameras, what sees in their pictures, and robots."""

@@ -1,0 +1,142 @@
+"""Camera: a thread that takes frames from a source and keeps the newest."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import NamedTuple, Protocol, Self
+
+from marl_airhockey.types import Array
+
+STALE = 0.1
+"""Age of the newest frame beyond which a camera is silent, s"""
+
+
+class CameraError(RuntimeError):
+    """Error of a camera that gives no pictures."""
+
+
+class Frame(NamedTuple):
+    """Picture of a camera."""
+
+    image: Array
+    """(H, W, 3) uint8, blue, green, red"""
+    taken: float
+    """Time of the middle of its exposure, of the monotonic clock, s"""
+    number: int
+    """Number in its source, from 0 on; gaps are frames that were dropped"""
+    arrived: float = float("nan")
+    """Time at which a `Camera` had it, of the monotonic clock, s"""
+
+
+class Source(Protocol):
+    """Source of frames, read by one thread."""
+
+    def open(self) -> None:
+        """Begin.
+
+        Raises:
+            CameraError: there is nothing to read, with the fix.
+        """
+
+    def read(self) -> Frame | None:
+        """Wait for the next frame and return it; None at the end."""
+
+    def close(self) -> None:
+        """End; a `read` that waits returns."""
+
+
+class Camera:
+    """Camera that keeps the newest frame of a source.
+
+    It is used in a ``with`` block.
+
+    Args:
+        source: of the frames.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._new = threading.Condition()
+        self._frame: Frame | None = None
+        self._closing = False
+        self._thread: threading.Thread | None = None
+        self._error = ""
+        self.dropped = 0
+        """Number of frames that nobody took before the next one came."""
+        self._taken = -1
+        self.listeners: list[Callable[[Frame], None]] = []
+        """Functions that get every frame, in the thread that reads: they return at
+        once."""
+
+    def __enter__(self) -> Self:
+        self._source.open()
+        self._closing = False
+        self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._closing = True
+        self._source.close()
+        if self._thread is not None:
+            self._thread.join(2.0)
+
+    def _read(self) -> None:
+        try:
+            while not self._closing:
+                frame = self._source.read()
+                if frame is None:
+                    break
+                frame = frame._replace(arrived=time.monotonic())
+                for listen in tuple(self.listeners):
+                    listen(frame)
+                with self._new:
+                    if self._frame is not None and self._frame.number != self._taken:
+                        self.dropped += 1
+                    self._frame = frame
+                    self._new.notify_all()
+        except (CameraError, OSError) as error:
+            self._error = str(error)
+
+    @property
+    def newest(self) -> Frame | None:
+        """Newest frame, for who only wants to show it; None before the first."""
+        return self._frame
+
+    @property
+    def age(self) -> float:
+        """Age of the newest frame, s; infinite before the first."""
+        frame = self._frame
+        return time.monotonic() - frame.taken if frame else float("inf")
+
+    @property
+    def trouble(self) -> str:
+        """Reason why there are no new frames; "" while there are."""
+        if self._error:
+            return f"camera: {self._error}"
+        if self.age > STALE:
+            return f"camera: no frame for {min(self.age, 99.0):.2f} s"
+        return ""
+
+    def next(self, after: int = -1, seconds: float = 1.0) -> Frame | None:
+        """Return the newest frame as soon as its number exceeds ``after``.
+
+        None if none comes within some seconds.
+        """
+        with self._new:
+            self._new.wait_for(
+                lambda: self._frame is not None and self._frame.number > after, seconds
+            )
+            frame = self._frame
+            if frame is None or frame.number <= after:
+                return None
+            self._taken = frame.number
+            return frame

@@ -1,0 +1,228 @@
+"""Sources of frames: a camera on this machine, a file, a stream, a function."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from marl_airhockey.devices.camera.camera import CameraError, Frame, Source
+from marl_airhockey.types import Array
+
+HEADER = struct.Struct(">4sQdII")
+"""Head of a frame in a stream: `MAGIC`, number, time taken, height, width"""
+MAGIC = b"AIRF"
+LATENCY = 0.025
+"""Time from the middle of an exposure until its picture is here, s, unless it was
+measured: half an exposure of 8 ms, the readout and the transfer of a PS Eye"""
+CONNECT = 3.0
+"""Longest time until a stream answers, s"""
+
+
+class CapturedSource:
+    """Source that is a camera of this machine, by V4L2.
+
+    Args:
+        device: its number.
+        width: of the pictures.
+        height: of the pictures.
+        rate: frames a second.
+        latency: s from the middle of an exposure until the picture is here.
+    """
+
+    def __init__(
+        self,
+        device: int,
+        width: int = 640,
+        height: int = 480,
+        rate: float = 60.0,
+        latency: float = LATENCY,
+    ) -> None:
+        self._device, self._size, self._rate = device, (width, height), rate
+        self._latency, self._count = latency, 0
+        self._capture: Any = None
+
+    def open(self) -> None:
+        capture = cv2.VideoCapture(self._device, cv2.CAP_V4L2)
+        if not capture.isOpened():
+            raise CameraError(
+                f"device {self._device} cannot be opened; see which there are with "
+                "ls /dev/video*"
+            )
+        capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size[0])
+        capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size[1])
+        capture.set(cv2.CAP_PROP_FPS, self._rate)
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+        self._capture = capture
+
+    def read(self) -> Frame | None:
+        found, image = self._capture.read()
+        if not found:
+            raise CameraError(f"device {self._device} gives no more pictures")
+        self._count += 1
+        return Frame(image, time.monotonic() - self._latency, self._count - 1)
+
+    def close(self) -> None:
+        if self._capture is not None:
+            self._capture.release()
+
+
+class FileSource:
+    """Source that is a video file, at its own pace or as fast as it is read.
+
+    Args:
+        path: of the file.
+        realtime: whether to wait between frames.
+    """
+
+    def __init__(self, path: str | Path, realtime: bool = True) -> None:
+        self._path, self._realtime = Path(path), realtime
+        self._capture: Any = None
+        self._count, self._began, self.rate = 0, 0.0, 0.0
+
+    def open(self) -> None:
+        self._capture = cv2.VideoCapture(str(self._path))
+        if not self._path.exists() or not self._capture.isOpened():
+            raise CameraError(f"{self._path}: there is no video that can be read")
+        self.rate = self._capture.get(cv2.CAP_PROP_FPS) or 30.0
+        """Frames a second."""
+        self._began = time.monotonic()
+
+    def read(self) -> Frame | None:
+        found, image = self._capture.read()
+        if not found:
+            return None
+        due = self._began + self._count / self.rate
+        if self._realtime:
+            time.sleep(max(due - time.monotonic(), 0.0))
+        self._count += 1
+        return Frame(image, due, self._count - 1)
+
+    def close(self) -> None:
+        if self._capture is not None:
+            self._capture.release()
+
+
+class StreamSource:
+    """Source that is a stream of raw frames from another process of this machine.
+
+    Args:
+        port: on the loopback address.
+        host: that address; times are those of this machine's clock.
+    """
+
+    def __init__(self, port: int, host: str = "127.0.0.1") -> None:
+        self._address = host, port
+        self._socket: socket.socket | None = None
+
+    def open(self) -> None:
+        try:
+            self._socket = socket.create_connection(self._address, CONNECT)
+        except OSError as error:
+            raise CameraError(
+                f"no stream at {self._address[0]}:{self._address[1]}: {error}"
+            ) from error
+        self._socket.settimeout(None)
+
+    def read(self) -> Frame | None:
+        head = self._take(HEADER.size)
+        if head is None:
+            return None
+        magic, number, taken, height, width = HEADER.unpack(head)
+        if magic != MAGIC:
+            raise CameraError("the stream holds something else than frames")
+        body = self._take(height * width * 3)
+        if body is None:
+            return None
+        return Frame(
+            np.frombuffer(body, np.uint8).reshape(height, width, 3), taken, number
+        )
+
+    def _take(self, size: int) -> bytearray | None:
+        """Return the next bytes; None if the stream ends before."""
+        assert self._socket is not None
+        buffer, done = bytearray(size), 0
+        view = memoryview(buffer)
+        while done < size:
+            try:
+                got = self._socket.recv_into(view[done:])
+            except OSError:
+                return None
+            if not got:
+                return None
+            done += got
+        return buffer
+
+    def close(self) -> None:
+        if self._socket is not None:
+            # Wakes a thread that waits in `read`.
+            with contextlib.suppress(OSError):
+                self._socket.shutdown(socket.SHUT_RDWR)
+            self._socket.close()
+
+
+class SyntheticSource:
+    """Source that draws its frames itself.
+
+    Args:
+        draw: function (time taken, s) -> (H, W, 3) uint8.
+        rate: frames a second.
+    """
+
+    def __init__(self, draw: Callable[[float], Array], rate: float = 30.0) -> None:
+        self._draw, self._period = draw, 1.0 / rate
+        self._ended = threading.Event()
+        self._count, self._due = 0, 0.0
+
+    def open(self) -> None:
+        self._due = time.monotonic()
+
+    def read(self) -> Frame | None:
+        self._due += self._period
+        if self._ended.wait(max(self._due - time.monotonic(), 0.0)):
+            return None
+        self._count += 1
+        return Frame(self._draw(self._due), self._due, self._count - 1)
+
+    def close(self) -> None:
+        self._ended.set()
+
+
+def pack_frame(frame: Frame) -> bytes:
+    """Return a frame as it is sent in a stream."""
+    height, width, _ = frame.image.shape
+    head = HEADER.pack(MAGIC, frame.number, frame.taken, height, width)
+    return head + frame.image.tobytes()
+
+
+def open_source(text: str, latency: float = LATENCY) -> Source:
+    """Return the source that a text names.
+
+    Args:
+        text: ``v4l2:0``, ``stream:PORT``, or the path of a video.
+        latency: of a camera of this machine, see `CapturedSource`.
+
+    Raises:
+        ValueError: neither.
+    """
+    kind, _, rest = text.partition(":")
+    if kind in ("v4l2", "stream"):
+        if not rest.isdigit():
+            raise ValueError(f"camera {text!r}: expected {kind}: and a number")
+        number = int(rest)
+        if kind == "v4l2":
+            return CapturedSource(number, latency=latency)
+        return StreamSource(number)
+    if Path(text).exists():
+        return FileSource(text)
+    raise ValueError(
+        f"camera {text!r}: expected v4l2:NUMBER, stream:PORT or the path of a video"
+    )

@@ -1,0 +1,81 @@
+"""Rig of a hand: a camera over a field on which a person moves a paddle."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.devices.rig_file import load_rig, save_rig
+from marl_airhockey.devices.vision.colour import Colour
+from marl_airhockey.devices.vision.detector import Detector
+from marl_airhockey.devices.vision.lens import View
+from marl_airhockey.types import Array
+
+KIND = "hand"
+"""Kind of the file"""
+
+
+@dataclass(frozen=True)
+class HandRig:
+    """Rig of a hand. The field's frame: origin at its middle, x away from the person.
+
+    Raises:
+        ValueError: a field without a size.
+    """
+
+    camera: str
+    """Source of the pictures, see `camera.open_source`"""
+    view: View
+    """View of the field"""
+    paddle: Colour
+    """Colour of the paddle's top"""
+    size: tuple[float, float]
+    """Length, along x, and width of the field, m"""
+    radius: float = 0.047625
+    """Radius of the paddle, m"""
+    height: float = 0.06
+    """Height of its top above the field, m"""
+    readout: float = 0.0
+    """Time between the first and the last row of a picture, s"""
+    tags: dict[str, list[list[float]]] = field(default_factory=dict)
+    """Corners of the printed tags by number, field's frame, m"""
+    made: str = ""
+    """Date of the calibration"""
+
+    def __post_init__(self) -> None:
+        if len(self.size) != 2 or not min(self.size) > 0.0:
+            raise ValueError(f"size: {self.size}; expected length and width, m")
+
+    @property
+    def known_tags(self) -> dict[int, Array]:
+        """Corners (4, 2) of the tags by number, field's frame, m."""
+        return {int(k): np.array(four) for k, four in self.tags.items()}
+
+    @property
+    def detector(self) -> Detector:
+        """Detector of the paddle on the field."""
+        half = self.size[0] / 2, self.size[1] / 2
+        parts = self.view, self.paddle, self.radius, half, self.height
+        return Detector(*parts, readout=self.readout)
+
+    def save(self, path: Path) -> None:
+        """Write it as JSON."""
+        save_rig(path, KIND, asdict(self))
+
+    @staticmethod
+    def load(path: Path) -> HandRig:
+        """Read it.
+
+        Raises:
+            ValueError: a file that is missing, of another format or kind, or holds
+                something that makes no sense, named.
+        """
+        given = load_rig(path, KIND)
+        try:
+            view, paddle = View.from_json(given.pop("view")), given.pop("paddle")
+            size = tuple(float(x) for x in given.pop("size"))
+            return HandRig(view=view, paddle=Colour(**paddle), size=size, **given)  # type: ignore[arg-type]
+        except (KeyError, TypeError) as error:
+            raise ValueError(f"{path}: {error} is missing or wrong") from error

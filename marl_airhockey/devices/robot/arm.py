@@ -1,0 +1,55 @@
+"""Arm: the contract between the driver and the network of a robot."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple, Protocol
+
+from marl_airhockey.types import Array
+
+
+class ArmFault(IntEnum):
+    """Reason for which an arm does not follow, by itself."""
+
+    NONE = 0
+    PROTECTIVE_STOP = 1
+    EMERGENCY_STOP = 2
+    PROGRAM_LOST = 3
+
+
+class Reading(NamedTuple):
+    """State of an arm as it was told last, base frame."""
+
+    stamp: float
+    """Time of the robot's clock, s; one that stands still is a robot that is silent"""
+    pose: Array
+    """(6,) of the tool's centre: m and rotation vector"""
+    velocity: Array
+    """(6,) m/s and rad/s"""
+    force: Array
+    """(6,) N and Nm"""
+    joints: Array
+    """(6,) angles, rad, from the base to the last wrist"""
+    fault: ArmFault
+
+
+class Arm(Protocol):
+    """Arm that follows poses of its tool; all calls return within milliseconds."""
+
+    def read(self) -> Reading:
+        """Return what the robot has told last."""
+
+    def press(self, frame: Array, newtons: float) -> None:
+        """Become compliant along the z axis of a frame (6,) and press down."""
+
+    def follow(self, pose: Array, seconds: float) -> bool:
+        """Follow a pose (6,) until the next one ``seconds`` later; False if refused."""
+
+    def halt(self) -> None:
+        """Brake to rest and end compliance."""
+
+    def unlock(self) -> str:
+        """Release a protective stop; return "" or why that is refused."""
+
+    def close(self) -> None:
+        """Halt, if it still obeys, and disconnect."""

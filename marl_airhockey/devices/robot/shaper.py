@@ -1,0 +1,194 @@
+"""Shaper: the last filter before an arm, for each of its poses.
+
+From wanted velocities, which may be anything, it makes places that an arm can follow:
+within its speed, its acceleration and its jerk, and never beyond the reach. It goes on
+from what it has put out last, not from where the arm has got to.
+
+What holds the limits, whatever is asked for: after every step the paddle could still
+be braked to rest within speed and reach. A step after which it could not is mixed with
+the braking step, which is always such a one, as it begins the braking that was looked
+at one step before.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.core.geometry import half_planes
+from marl_airhockey.types import Array
+
+HALVINGS = 4
+"""Steps of the search for a mixture with braking"""
+LONGEST = 250
+"""Steps within which every braking is over"""
+AT_REST = 1e-9
+"""Speed, m/s, and acceleration, m/s2, below which braking is over"""
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """Limits of a paddle's motion.
+
+    Raises:
+        ValueError: a limit that is not above 0.
+    """
+
+    speed: float = 0.7
+    """m/s"""
+    acceleration: float = 7.0
+    """m/s2"""
+    jerk: float = 280.0
+    """m/s3: a reversal of the acceleration in a control step of 50 ms"""
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"{name}: {value!r} must be a number above 0")
+
+    @property
+    def stopping_distance(self) -> float:
+        """Way from top speed to rest, m."""
+        lead = self.acceleration / (2.0 * self.jerk)
+        return self.speed * (self.speed / (2.0 * self.acceleration) + lead)
+
+
+class Shaper:
+    """Shaper of one paddle's motion, table frame.
+
+    Args:
+        limits: of the motion.
+        reach: (K, 2) convex polygon of the paddle's centre, counter-clockwise, m.
+        dt: s between two steps.
+        place: (2,) where the paddle rests, m.
+    """
+
+    def __init__(
+        self, limits: MotionLimits, reach: Array, dt: float, place: Array
+    ) -> None:
+        self._limits, self._dt = limits, dt
+        corners = tuple((float(x), float(y)) for x, y in reach)
+        normals, self._offsets = half_planes(corners)
+        self._normals = normals[:, 0] + 1j * normals[:, 1]
+        # Edges that meet share what can be braked with, as in the world's limits.
+        meet = (normals * np.roll(normals, -1, 0)).sum(-1).min()
+        self._braking = limits.acceleration * np.sqrt((1.0 + meet) / 2.0)
+        # Vectors are complex numbers: a hundred times as fast as arrays of two.
+        self._place, self._velocity = complex(*place), 0j
+        self._acceleration = 0j
+        # Who begins outside may go in, and no further out.
+        outside = -((self._normals.conj() * self._place).real + self._offsets)
+        self._widened = self._offsets + np.maximum(outside, 0.0)
+
+    @property
+    def place(self) -> Array:
+        """(2,) m, where the arm was sent last."""
+        return _array(self._place)
+
+    @property
+    def velocity(self) -> Array:
+        """(2,) m/s, there."""
+        return _array(self._velocity)
+
+    @property
+    def acceleration(self) -> Array:
+        """(2,) m/s2, with which it got there."""
+        return _array(self._acceleration)
+
+    def step(self, wanted: Array, seconds: float) -> Array:
+        """Go on by ``dt`` and return the new place (2,), m.
+
+        Args:
+            wanted: (2,) velocity, m/s; one that is not finite is rest.
+            seconds: time in which it is to be reached by a linear ramp; 0 for at once.
+        """
+        target = self._inside(_fitted(complex(*wanted), self._limits.speed))
+        moved = self._velocity, self._acceleration
+        return self._advance(self._recoverable(self._toward(target, seconds, *moved)))
+
+    def brake(self) -> Array:
+        """Go on by ``dt`` toward rest and return the new place (2,), m."""
+        return self._advance(self._toward(0j, 0.0, self._velocity, self._acceleration))
+
+    def _advance(self, acceleration: complex) -> Array:
+        last, self._acceleration = self._velocity, acceleration
+        self._velocity += acceleration * self._dt
+        self._place += 0.5 * (last + self._velocity) * self._dt
+        return self.place
+
+    def _toward(
+        self, target: complex, seconds: float, velocity: complex, acceleration: complex
+    ) -> complex:
+        """Return the next acceleration, on the way to a velocity."""
+        limits, dt = self._limits, self._dt
+        change = target - velocity
+        size, pull = abs(change), 0j
+        if size > 0.0:
+            # Toward the end of a change the jerk must still fit in.
+            most = min(
+                limits.acceleration,
+                size / max(seconds, dt),
+                math.sqrt(limits.jerk * size),
+            )
+            pull = change * (most / size)
+        jerk = _fitted(pull - acceleration, limits.jerk * dt)
+        return _fitted(acceleration + jerk, limits.acceleration)
+
+    def _recoverable(self, wish: complex) -> complex:
+        """Return ``wish``, or as much of it as leaves braking within all limits."""
+        if self._can_brake(wish):
+            return wish
+        braking = best = self._toward(0j, 0.0, self._velocity, self._acceleration)
+        share = 0.5
+        for k in range(HALVINGS):
+            tried = braking + share * (wish - braking)
+            fits = self._can_brake(tried)
+            best = tried if fits else best
+            share += 0.25 * 0.5**k * (1 if fits else -1)
+        return best
+
+    def _can_brake(self, acceleration: complex) -> bool:
+        """Return whether one step so, and braking after it, keeps speed and reach."""
+        place, velocity, dt = self._place, self._velocity, self._dt
+        way = []
+        for _ in range(LONGEST):
+            last, velocity = velocity, velocity + acceleration * dt
+            if abs(velocity) > self._limits.speed:
+                return False
+            place += 0.5 * (last + velocity) * dt
+            way.append(place)
+            if abs(velocity) < AT_REST and abs(acceleration) < AT_REST:
+                room = np.multiply.outer(way, self._normals.conj()).real
+                return bool((room + self._widened).min() >= 0.0)
+            acceleration = self._toward(0j, 0.0, velocity, acceleration)
+        return False
+
+    def _inside(self, velocity: complex) -> complex:
+        """Return a velocity from which a stop in front of every edge still fits."""
+        limits = self._limits
+        room = (self._normals.conj() * self._place).real + self._offsets
+        # Way of a stop from v: v^2 / 2a, and v times the time until it brakes fully.
+        late = limits.acceleration / limits.jerk + 2.0 * self._dt
+        root = np.sqrt(late**2 + 2.0 * np.maximum(room, 0.0) / self._braking)
+        fastest = self._braking * (root - late)
+        for _ in range(8):
+            over = -(self._normals.conj() * velocity).real - fastest
+            worst = int(np.argmax(over))
+            if over[worst] <= 1e-12:
+                break
+            velocity += float(over[worst]) * complex(self._normals[worst])
+        return velocity
+
+
+def _fitted(vector: complex, most: float) -> complex:
+    """Return a vector no longer than ``most``; 0 for one that is not finite."""
+    size = abs(vector)
+    if not math.isfinite(size):
+        return 0j
+    return vector * (most / size) if size > most else vector
+
+
+def _array(vector: complex) -> Array:
+    return np.array([vector.real, vector.imag])

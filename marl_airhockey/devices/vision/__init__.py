@@ -1,0 +1,7 @@
+"""Vision: where a puck is, from the picture of a calibrated camera."""
+
+from marl_airhockey.devices.vision.colour import Colour
+from marl_airhockey.devices.vision.detector import Detector, Sighting
+from marl_airhockey.devices.vision.lens import Lens, View
+
+__all__ = ["Colour", "Detector", "Lens", "Sighting", "View"]

@@ -1,0 +1,180 @@
+"""Detector: the place of a puck, or of a paddle's top, in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from marl_airhockey.devices.camera.camera import Frame
+from marl_airhockey.devices.vision.colour import Colour
+from marl_airhockey.devices.vision.lens import View
+from marl_airhockey.types import Array
+
+LEAST, MOST = 0.35, 1.8
+"""Share of a whole puck's area that something must have to be one"""
+WHOLE = 0.93
+"""Share above which its middle is that of its pixels"""
+RIM = 2
+"""Pixels about what has a puck's colour in which some of it may be"""
+ROUND = 0.12
+"""Largest root mean square distance of the edge of a hidden puck from a circle, in
+radii"""
+
+
+class Sighting(NamedTuple):
+    """Puck that was seen in a picture."""
+
+    place: Array
+    """(2,) table frame, m"""
+    taken: float
+    """Time at which its row was exposed, of the monotonic clock, s"""
+    share: float
+    """Share of the puck that is visible"""
+    pixel: Array
+    """(2,) of its middle"""
+
+
+@dataclass(frozen=True)
+class Detector:
+    """Detector of a disc of one colour: a puck, or the top of a paddle."""
+
+    view: View
+    colour: Colour
+    radius: float
+    """Radius of the disc, m"""
+    extent: tuple[float, float]
+    """Half of the table's length and width, m; nothing is sought beyond"""
+    height: float = 0.003
+    """Height of its rim above the table, m"""
+    readout: float = 0.0
+    """Time from the exposure of the first row to that of the last, s: of a camera with
+    a rolling shutter"""
+
+    def find(self, frame: Frame) -> Sighting | None:
+        """Return where the disc is, the largest if there are several; None for none."""
+        return next(self._discs(frame), None)
+
+    def find_all(self, frame: Frame) -> list[Sighting]:
+        """Return all discs of the colour.
+
+        Parts of one that is hidden in its middle count once: their whole discs overlap.
+        """
+        found: list[Sighting] = []
+        for seen in self._discs(frame):
+            if all(
+                np.linalg.norm(seen.place - other.place) > self.radius
+                for other in found
+            ):
+                found.append(seen)
+        return found
+
+    def _discs(self, frame: Frame) -> Iterator[Sighting]:
+        """Give the discs among the largest parts that have the colour."""
+        x, y, right, bottom = self._part
+        image = frame.image[y:bottom, x:right]
+        mask = self.colour.mask(image)
+        _, labels, stats, middles = cv2.connectedComponentsWithStats(mask)
+        for k in 1 + np.argsort(stats[1:, cv2.CC_STAT_AREA])[::-1][:3]:
+            found = self._judge(image, labels, stats[k], middles[k], int(k))
+            if found is not None:
+                place, pixel, share = found
+                yield Sighting(place, self._time(frame, pixel), share, pixel)
+
+    def _time(self, frame: Frame, pixel: Array) -> float:
+        rows = frame.image.shape[0]
+        return float(frame.taken + self.readout * (float(pixel[1]) / rows - 0.5))
+
+    @cached_property
+    def _part(self) -> tuple[int, int, int, int]:
+        """Part of a picture in which the table is: left, top, right, bottom, px."""
+        along = np.linspace(-1.0, 1.0, 9)
+        rim = [(a, s) for a in along for s in (-1.0, 1.0)]
+        rim += [(s, a) for a, s in rim]
+        reach = np.asarray(self.extent) + 2 * self.radius
+        flat = np.column_stack([np.array(rim) * reach, np.full(len(rim), self.height)])
+        pixels, (width, height) = self.view.project(flat), self.view.lens.size
+        left, top = np.maximum(np.floor(pixels.min(0)), 0).astype(int)
+        right, bottom = np.ceil(pixels.max(0)).astype(int)
+        return int(left), int(top), min(int(right), width), min(int(bottom), height)
+
+    def _judge(
+        self, image: Array, labels: Array, box: Array, middle: Array, label: int
+    ) -> tuple[Array, Array, float] | None:
+        """Return place, pixel and visible share if a component is a puck."""
+        corner = np.array(self._part[:2], float)
+        middle = middle + corner
+        place = self.view.to_table(middle, self.height)[0]
+        if (np.abs(place) > np.asarray(self.extent) + self.radius).any():
+            return None
+        whole = np.pi * (self.radius * self.view.scale(place, self.height)) ** 2
+        share = float(box[cv2.CC_STAT_AREA]) / whole
+        if not LEAST < share < MOST:
+            return None
+        x, y, width, height = box[:4]
+        if share > WHOLE:
+            rim = np.array([x, y]) - RIM
+            low = np.maximum(rim, 0)
+            high = np.array([x + width, y + height]) + RIM
+            patch = image[low[1] : high[1], low[0] : high[0]]
+            pixel = self.colour.middle(patch) + low + corner
+            return self.view.to_table(pixel, self.height)[0], pixel, min(share, 1.0)
+        part = (labels[y : y + height, x : x + width] == label).astype(np.uint8)
+        completed = self._complete(part, np.array([x, y]) + corner)
+        if completed is None:
+            return None
+        pixel = self.view.project(np.array([[*completed, self.height]]))[0]
+        return completed, pixel, share
+
+    def _complete(self, part: Array, corner: Array) -> Array | None:
+        """Return the middle of a partly hidden puck, from the round part of its edge.
+
+        Its radius is known: of the circles through two points of the edge the one that
+        most of the edge lies on is taken, and refined on these.
+        """
+        contours, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        edge = max(contours, key=len)[:, 0, :] + corner
+        if len(edge) < 12:
+            return None
+        # A pixel's middle lies half a pixel inside the edge.
+        points = self.view.to_table(edge, self.height)
+        inner = self.radius - 0.5 / self.view.scale(points.mean(0), self.height)
+        tried = points[:: max(len(points) // 16, 1)]
+        centres = _centres(tried, inner)
+        if not len(centres):
+            return None
+        gaps = np.abs(np.linalg.norm(points - centres[:, None], axis=-1) - inner)
+        close = gaps < ROUND * self.radius
+        # No part of what is visible lies outside of the puck.
+        beyond = np.linalg.norm(points - centres[:, None], axis=-1) > 1.15 * self.radius
+        score = close.sum(1) - 2 * beyond.sum(1)
+        best = int(np.argmax(score))
+        on = points[close[best]]
+        if len(on) < 0.3 * len(points):
+            return None
+        centre = centres[best]
+        for _ in range(4):
+            ways = on - centre
+            sizes = np.linalg.norm(ways, axis=1)
+            directions = ways / sizes[:, None]
+            step, *_ = np.linalg.lstsq(directions, sizes - inner, rcond=None)
+            centre = centre + step
+        return np.asarray(centre)
+
+
+def _centres(points: Array, radius: float) -> Array:
+    """Return the centres (m, 2) of the circles of a radius through pairs of points."""
+    first, second = np.triu_indices(len(points), 3)
+    a, b = points[first], points[second]
+    half = (b - a) / 2
+    square = radius**2 - (half**2).sum(1)
+    far = (square > 0) & ((half**2).sum(1) > (0.2 * radius) ** 2)
+    half, a = half[far], a[far]
+    normal = np.stack([-half[:, 1], half[:, 0]], 1)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    aside = np.sqrt(square[far])[:, None] * normal
+    return np.concatenate([a + half + aside, a + half - aside])

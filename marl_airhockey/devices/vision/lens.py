@@ -1,0 +1,102 @@
+"""Lens and view: from places over a table to pixels, and back.
+
+Points are transformed, never pictures: that is as exact and costs microseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import cv2
+import numpy as np
+
+from marl_airhockey.types import Array
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Lens of a camera."""
+
+    matrix: tuple[tuple[float, float, float], ...]
+    """(3, 3) camera matrix, px"""
+    distortion: tuple[float, ...]
+    """Coefficients as OpenCV has them: k1, k2, p1, p2, k3"""
+    size: tuple[int, int]
+    """Width and height of the pictures, px"""
+    residual: float = 0.0
+    """Root of the mean squared error of its calibration, px"""
+
+    @cached_property
+    def arrays(self) -> tuple[Array, Array]:
+        """Camera matrix and distortion."""
+        return np.array(self.matrix, float), np.array(self.distortion, float)
+
+
+@dataclass(frozen=True)
+class View:
+    """View of a table by a camera that stays where it is."""
+
+    lens: Lens
+    rotation: tuple[float, float, float]
+    """Rotation vector from the table frame to the camera's"""
+    translation: tuple[float, float, float]
+    """Table's centre in the camera's frame, m"""
+    residual: float = 0.0
+    """Root of the mean squared error of its calibration, px"""
+
+    @staticmethod
+    def from_json(given: Mapping[str, Any]) -> View:
+        """Return the view that a JSON object holds, as `dataclasses.asdict` makes it.
+
+        Raises:
+            KeyError: a field is missing.
+            TypeError: there is another field, or one of another kind.
+        """
+        view = dict(given)
+        lens = dict(view.pop("lens"))
+        matrix = tuple(tuple(row) for row in lens.pop("matrix"))
+        lens = {k: tuple(v) if isinstance(v, list) else v for k, v in lens.items()}
+        vector, shift = tuple(view.pop("rotation")), tuple(view.pop("translation"))
+        return View(Lens(matrix=matrix, **lens), vector, shift, **view)
+
+    @cached_property
+    def _pose(self) -> tuple[Array, Array]:
+        matrix = cv2.Rodrigues(np.array(self.rotation, float))[0]
+        return matrix, np.array(self.translation, float)
+
+    @cached_property
+    def centre(self) -> Array:
+        """(3,) place of the camera, table frame, m."""
+        rotation, translation = self._pose
+        return np.asarray(-rotation.T @ translation)
+
+    def project(self, points: Array) -> Array:
+        """Return the pixels (n, 2) of points (n, 3), table frame, m."""
+        pixels, _ = cv2.projectPoints(
+            np.asarray(points, float).reshape(-1, 1, 3),
+            np.array(self.rotation, float),
+            np.array(self.translation, float),
+            *self.lens.arrays,
+        )
+        return np.asarray(pixels).reshape(-1, 2)
+
+    def to_table(self, pixels: Array, height: float = 0.0) -> Array:
+        """Return the places (n, 2), m, at a height over the table, of pixels (n, 2)."""
+        flat = np.asarray(pixels, float).reshape(-1, 1, 2)
+        rays = cv2.undistortPoints(flat, *self.lens.arrays).reshape(-1, 2)
+        rotation, _ = self._pose
+        ways = np.column_stack([rays, np.ones(len(rays))]) @ rotation
+        steps = (height - self.centre[2]) / ways[:, 2]
+        return np.asarray(self.centre[:2] + steps[:, None] * ways[:, :2])
+
+    def scale(self, place: Array, height: float = 0.0) -> float:
+        """Return the pixels that a metre has at a place (2,)."""
+        x, y = place
+        ends = [[x, y, height], [x + 0.01, y, height], [x, y + 0.01, height]]
+        here, ahead, aside = self.project(np.array(ends))
+        ax, ay = ahead - here
+        bx, by = aside - here
+        return float(100.0 * np.sqrt(abs(ax * by - ay * bx)))

@@ -1,0 +1,64 @@
+"""Watcher: a thread that looks for a disc in every picture of a camera."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+
+from marl_airhockey.devices.camera import Camera
+from marl_airhockey.devices.vision.detector import Detector, Sighting
+
+KEPT = 256
+"""Sightings that are kept until somebody takes them"""
+
+
+class Watcher:
+    """Watcher of a puck, or of a paddle.
+
+    Args:
+        camera: whose pictures it looks at.
+        detector: of what it looks for.
+    """
+
+    def __init__(self, camera: Camera, detector: Detector) -> None:
+        self._camera, self._detector = camera, detector
+        self._found: deque[Sighting] = deque(maxlen=KEPT)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="watcher", daemon=True)
+        self.last: Sighting | None = None
+        """Newest sighting."""
+        self.looked_at = float("nan")
+        """Time at which the newest picture was taken, s."""
+        self.seconds = 0.0
+        """CPU time that looking has taken, s."""
+        self.pictures = 0
+        """Number of pictures that were looked at."""
+        self._thread.start()
+
+    def _watch(self) -> None:
+        number = -1
+        while not self._ended.is_set():
+            frame = self._camera.next(number, 0.2)
+            if frame is None:
+                continue
+            number, began = frame.number, time.thread_time()
+            seen = self._detector.find(frame)
+            self.seconds += time.thread_time() - began
+            self.pictures += 1
+            self.looked_at = frame.taken
+            if seen is not None:
+                self.last = seen
+                self._found.append(seen)
+
+    def take(self) -> list[Sighting]:
+        """Return what was seen since the last call, the oldest first."""
+        seen = []
+        while self._found:
+            seen.append(self._found.popleft())
+        return seen
+
+    def close(self) -> None:
+        """End."""
+        self._ended.set()
+        self._thread.join(1.0)
