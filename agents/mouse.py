@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.toolkit import Array, Driver, View, length
+from marl_airhockey.toolkit import Array, Driver, View
+from marl_airhockey.toolkit.pointing import point_to
 
 
 class Mouse(Driver):
     """Driver that commands a velocity which ends at rest at a wanted position.
 
-    The command is bounded by the seat's top speed and by a speed from which the paddle
-    can still stop in time; `limits` bounds it further, as for every driver.
+    Args:
+        lag: time by which the paddle answers late, see `point_to`, s.
     """
 
-    gain = 25.0
-    """Commanded speed per distance near the target (1/s)."""
-    brake = 0.6
-    """Share of the seat's acceleration that is assumed for stopping in time."""
+    led = True
 
-    def __init__(self) -> None:
+    def __init__(self, lag: float = 0.0) -> None:
+        self._lag = lag
         self.target: tuple[float, float] | None = None
         """Wanted position, ego frame, m; None without one."""
 
@@ -34,15 +33,9 @@ class Mouse(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        own = view.state.paddle[:, view.seat]
         if self.target is None:
-            return np.zeros_like(own), memory
-        way = np.array(self.target) - own
-        far = np.maximum(length(way), 1e-9)
-        brake = self.brake * view.scene.seats[view.seat].acceleration
-        speed = np.minimum(self.gain * far, np.sqrt(2.0 * brake * far))
-        speed = np.minimum(speed, view.top_speed)
-        return way * (speed / far / view.top_speed)[:, None], memory
+            return np.zeros((len(view.top_speed), 2)), memory
+        return point_to(view, np.array(self.target), lag=self._lag), memory
 
 
 make = Mouse

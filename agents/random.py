@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from marl_airhockey.toolkit import Array, Driver, View
 
 
 class Random(Driver):
     """Driver with actions uniform in the action box."""
+
+    erratic: ClassVar[bool] = True
 
     def act(
         self, view: View, memory: dict[str, Array]

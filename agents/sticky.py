@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from marl_airhockey.toolkit import Array, Driver, RandomStreams, Seat, View
 @dataclass
 class Sticky(Driver):
     """Driver with actions uniform in the action box, drawn every ``hold`` steps."""
+
+    erratic: ClassVar[bool] = True
 
     hold: int = 10
     """Number of steps that an action is held."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.jit.pipeline import Stage
@@ -74,7 +75,11 @@ class Backend(ABC):
     """True if paddles move exactly as commanded and contacts take no time. Where they
     do not, no servo is simulated besides."""
     realtime: ClassVar[bool] = False
-    """True if a step takes as long as it lasts."""
+    """True for a real table: a step takes as long as it lasts, episodes begin as
+    somebody arranges them, and a camera sees what no simulated sensor has to spoil."""
+    late: ClassVar[bool] = False
+    """True if paddles follow their commands late, so that limits go on from the last
+    command instead of from how paddles move."""
     timestep: ClassVar[float | None]
     """Longest physics step unless ``substeps`` is given, s; None without such steps."""
     cameras: ClassVar[tuple[str, ...]] = ()
@@ -139,6 +144,44 @@ class Backend(ABC):
         """
         self._before = state
 
+    def connect(self, rig: str) -> None:
+        """Connect to the devices of a real table, which a file describes.
+
+        Raises:
+            ValueError: this backend has none, or the file makes no sense.
+            RuntimeError: a device does not answer, with the fix.
+        """
+        raise ValueError(
+            'rig: this backend has no devices; leave it out, or take backend="real"'
+        )
+
+    def expect(self, physics: Physics) -> None:
+        """Take note of the ranges in which the physics of this table may lie."""
+        return None
+
+    def arrange(self, state: State) -> State:
+        """Bring about the state in which an episode is to begin; return that it is.
+
+        Called after `reset` where `realtime` is true; a simulated table is at once as
+        it is wanted.
+
+        Raises:
+            RuntimeError: it cannot be brought about, with the reason.
+        """
+        return state
+
+    @property
+    def interruption(self) -> str:
+        """Reason why the running episode cannot go on; "" while it can."""
+        return ""
+
+    def sight(self) -> Array:
+        """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest picture.
+
+        Called where `realtime` is true.
+        """
+        raise NotImplementedError
+
     @abstractmethod
     def stage(self, command: Command, before: State, after: State) -> Stage:
         """Return a step of ``control_dt`` between states that stay, for all worlds.
@@ -166,6 +209,14 @@ class Backend(ABC):
             path = np.zeros((self.num_worlds, rows, movers, 4))
         bodies, visible = self.scene.bodies, self._rest.visible
         return State(bodies=bodies, visible=visible, path=path, **fields)
+
+    def telemetry(self) -> dict[str, Any]:
+        """Return what the devices of a real table tell of themselves; JSON values.
+
+        The command that was ``asked`` for and the one that was ``sent``, m/s, are
+        among them. A simulation has none.
+        """
+        return {}
 
     def photograph(
         self, world: int, camera: str, marks: Sequence[Mark], width: int

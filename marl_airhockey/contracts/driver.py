@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Self
+from typing import ClassVar, Self
 
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
@@ -61,6 +61,15 @@ class Driver:
     """Observation that the driver wants; None for the environment's."""
     control_dt: float | None = None
     """s between two decisions, a multiple of the environment's; None for the same."""
+    erratic: ClassVar[bool] = False
+    """True for one that must never move a real arm."""
+    led: ClassVar[bool] = False
+    """True for one that a person leads: handicaps of programs are not for it."""
+
+    @property
+    def trouble(self) -> str:
+        """Reason, in words, why its paddle rests although it is led; "" for none."""
+        return ""
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:
         """Refuse, before the first step, observations that it cannot act on.

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.parameters import PARAMETERS, PRESETS
-from marl_airhockey.core.profiles import PROFILES, Follow
+from marl_airhockey.core.parameters import PARAMETERS, PRESETS, SCATTER
+from marl_airhockey.core.profiles import Follow, find_profile
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array
 
@@ -26,14 +26,25 @@ Given = str | Path | Mapping[str, Any]
 name, which change those of a ``preset`` if one is named among them."""
 
 
+SIMULATED = (
+    *("observation_delay", "observation_jitter", "position_noise"),
+    *("calibration_error", "occlusion", "false_detection"),
+    *("action_delay", "servo_time", *SCATTER),
+)
+"""Names of what a simulation adds, since a real table has it by itself"""
+
+
 class Physics:
     """Parameters of an environment: a value or a range for each name.
 
     Args:
         base: values that replace the defaults (table, seats, scenario).
-        profile: name of the ranges that replace these, see `profiles.PROFILES`.
+        profile: name or file of the ranges that replace these, see
+            `profiles.find_profile`.
         given: the user's physics: a preset, values and ranges, which override both.
         arms: True if the backend has robot arms, whose parameters exist then.
+        real: True if the table is real: nothing that a simulation adds to a state is
+            drawn, neither delays nor noise nor scatter.
 
     Raises:
         ValueError: an unknown name, or a value outside its bounds.
@@ -45,16 +56,16 @@ class Physics:
         profile: str = "ideal",
         given: Given | None = None,
         arms: bool = False,
+        real: bool = False,
     ) -> None:
-        if profile not in PROFILES:
-            raise ValueError(unknown_name("profile", profile, PROFILES))
+        spread = find_profile(profile)
         chosen = load_physics(given) if isinstance(given, (str, Path)) else given or {}
         if not isinstance(chosen, Mapping):
             raise ValueError(
                 f"physics: {given!r} is no preset, TOML file or dict of parameters"
             )
         values = dict(chosen)
-        preset, spread = _preset(values.pop("preset", None)), PROFILES[profile]
+        preset = _preset(values.pop("preset", None))
         self.ranges: dict[str, tuple[float, float]] = {}
         self._follows: dict[str, Follow] = {}
         for name, parameter in PARAMETERS.items():
@@ -85,6 +96,8 @@ class Physics:
                 )
             self.ranges[name] = pair
             self._follows.pop(name, None)
+        if real:
+            self.ranges.update(dict.fromkeys(SIMULATED, (0.0, 0.0)))
 
     def draw(self, rng: RandomStreams) -> dict[str, Array]:
         """Draw one value of every parameter for each of W worlds: name -> (W,)."""

@@ -7,14 +7,20 @@ documentation's page on physics), the gantry that played there, and a UR5e with 
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.types import Array
 
 Range = tuple[float, float]
+SUFFIX = ".toml"
+"""Ending of the names of files of profiles"""
 
 
 @dataclass(frozen=True)
@@ -157,6 +163,63 @@ PROFILES: dict[str, Profile] = {
     ),
 }
 """Profiles by name."""
+
+
+def find_profile(name: str) -> Profile:
+    """Return a profile by its name, or that of a TOML file.
+
+    A file has ``base``, the name of a profile, ``what``, and a table ``ranges`` of
+    [low, high] by parameter, which replace those of the base: see `load_profile`.
+
+    Raises:
+        ValueError: an unknown name, or a file that makes no sense.
+    """
+    if name in PROFILES:
+        return PROFILES[name]
+    if name.endswith(SUFFIX):
+        return load_profile(Path(name))
+    raise ValueError(unknown_name("profile", name, PROFILES))
+
+
+def load_profile(path: Path) -> Profile:
+    """Read a profile from a TOML file, such as ``airhockey fit --base ur5e`` writes.
+
+    Raises:
+        ValueError: no such file, an unknown base or parameter, or a range that is none.
+    """
+    try:
+        given = tomllib.loads(path.read_text())
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"profile {path}: {error}") from error
+    known = {"base", "what", "ranges"}
+    for name in given.keys() - known:
+        raise ValueError(f"profile {path}: {unknown_name('key', name, known)}")
+    base_name, ranges = given.get("base", "ideal"), given.get("ranges", {})
+    if base_name not in PROFILES:
+        raise ValueError(
+            f"profile {path}: {unknown_name('base', str(base_name), PROFILES)}"
+        )
+    for name, pair in ranges.items():
+        if name not in PARAMETERS:
+            raise ValueError(
+                f"profile {path}: {unknown_name('parameter', name, PARAMETERS)}"
+            )
+        numbers = isinstance(pair, list) and len(pair) == 2
+        if not numbers or not all(isinstance(x, (int, float)) for x in pair):
+            raise ValueError(f"profile {path}: {name}: expected [low, high]")
+        low, high, bounds = pair[0], pair[1], PARAMETERS[name]
+        if not bounds.low <= low <= high <= bounds.high:
+            raise ValueError(
+                f"profile {path}: {name}: {pair} is no range within {bounds.low} .. "
+                f"{bounds.high}"
+            )
+    base = PROFILES[base_name]
+    return Profile(
+        str(given.get("what", path.stem)),
+        {**base.ranges, **{k: (float(a), float(b)) for k, (a, b) in ranges.items()}},
+        {k: v for k, v in base.shares.items() if k not in ranges},
+        {k: v for k, v in base.follows.items() if k not in ranges},
+    )
 
 
 def delay_of(profile: Profile) -> Range:

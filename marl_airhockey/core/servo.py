@@ -61,28 +61,58 @@ def _lag(
     dt: float,
     action: Array,
 ) -> None:
-    """Fill actions and rates with the exact answer of the lag to a ramp."""
+    """Fill actions and rates with the answer of the lag."""
     answer = np.empty(2)
     for b in range(len(action)):
-        if time[b] > 0.0:
-            w, left = HALF / time[b], np.exp(-HALF / time[b] * dt)
-        else:
-            w, left = np.inf, 0.0
+        w = HALF / time[b] if time[b] > 0.0 else np.inf
+        left = np.exp(-w * dt)
         for s in range(action.shape[1]):
             for axis in range(2):
-                slope = (after[b, s, axis] - before[b, s, axis]) / dt
-                late = 2.0 * slope / w
-                gap = velocity[b, s, axis] - before[b, s, axis] + late
-                bend = rate[b, s, axis] - slope
-                if left > 0.0:
-                    bend += w * gap
-                    gap = (gap + bend * dt) * left
-                    new_rate[b, s, axis] = slope + bend * left - w * gap
-                else:
-                    gap, new_rate[b, s, axis] = 0.0, slope
-                answer[axis] = after[b, s, axis] - late + gap
+                answer[axis], new_rate[b, s, axis] = follow_ramp(
+                    before[b, s, axis],
+                    after[b, s, axis],
+                    velocity[b, s, axis],
+                    rate[b, s, axis],
+                    w,
+                    left,
+                    dt,
+                )
             for axis in range(2):
                 along = (
                     rotation[s, axis, 0] * answer[0] + rotation[s, axis, 1] * answer[1]
                 )
                 action[b, s, axis] = along / top_speed[b]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def follow_ramp(
+    before: float,
+    after: float,
+    value: float,
+    rate: float,
+    w: float,
+    left: float,
+    dt: float,
+) -> tuple[float, float]:
+    """Return the exact answer of the lag to a ramp, and its rate, after a time dt.
+
+    Args:
+        before: order at the start.
+        after: order at the end.
+        value: of the lag at the start.
+        rate: of the lag at the start, per s.
+        w: frequency of the lag, `HALF` by its half-rise, 1/s; infinite for no lag.
+        left: exp(-w dt), given because many answers share it.
+        dt: time, s.
+    """
+    slope = (after - before) / dt
+    late = 2.0 * slope / w
+    gap = value - before + late
+    bend = rate - slope
+    if left > 0.0:
+        bend += w * gap
+        gap = (gap + bend * dt) * left
+        rate = slope + bend * left - w * gap
+    else:
+        gap, rate = 0.0, slope
+    return after - late + gap, rate

@@ -89,8 +89,8 @@ class State:
     touched: Array
     """Number of contacts that began in the step (..., paddles, pucks)"""
     touched_at: Array
-    """Time into the step at which the last of these began, nan without any
-    (..., paddles, pucks), s"""
+    """Time into the step at which the last of these began, nan without any; below 0 on
+    a real table, where contacts are seen late (..., paddles, pucks), s"""
     touching: Array
     """True if in contact at the end of the step (..., paddles, pucks)"""
     banked: Array

@@ -61,6 +61,7 @@ class Actions:
         self,
         step: ControlStep,
         actions: Array,
+        prescribed: Array | None,
         sensed: State,
         memory: Memory,
         episode: Episode,
@@ -70,6 +71,7 @@ class Actions:
         Args:
             step: its ``action``, ``prescribed``, ``closed`` and ``raised`` are filled.
             actions: (B, open, 2) of the open seats.
+            prescribed: (B, open, 4) of the open seats, nan where they ask; or None.
             sensed: state that drivers see, table frame.
             memory: of the scenario.
             episode: its counters and physics.
@@ -89,15 +91,16 @@ class Actions:
             step.action[:] = actions
         else:
             step.action[:, self._open] = actions
+        if prescribed is not None:
+            for k, measured in zip(self._open, prescribed.swapaxes(0, 1), strict=True):
+                self._prescribe(step, int(k), measured)
         for seat in self._driven:
             measured, k = seat.measured(), seat.index
             if measured is None:
                 values, cycles = episode.physics, episode.cycles
                 step.action[:, k] = seat.act(sensed, memory, values, cycles)
-                continue
-            step.action[:, k], self._prescribes = 0.0, True
-            step.prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
-            step.prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
+            else:
+                self._prescribe(step, k, measured)
         retired = self._scenario.retired(memory)
         if retired is not None and retired.any():
             seats, self._prescribes = self._retired_seats, True
@@ -107,3 +110,14 @@ class Actions:
         if self._delay is not None:
             delay = episode.physics["action_delay"]
             step.action[:] = self._delay.push(step.action, delay)
+
+    def _prescribe(self, step: ControlStep, k: int, measured: Array) -> None:
+        """Put a seat's paddle where it was measured, (B, 4), ego frame; nan: it asks.
+
+        What a seat asks for while it prescribes is nothing.
+        """
+        self._prescribes = True
+        given = np.isfinite(measured[:, :1])
+        step.action[:, k] = np.where(given, 0.0, step.action[:, k])
+        step.prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
+        step.prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]

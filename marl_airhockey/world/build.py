@@ -39,6 +39,7 @@ class Keywords(TypedDict, total=False):
     substeps: int
     max_cycles: int
     options: Mapping[str, Any]
+    rig: str
 
 
 def build_world(
@@ -59,7 +60,8 @@ def build_world(
                 of policies, functions, models and so on; the other seats are open.
             seats: "robot" or "arcade".
             profile: "ideal", or what a robot senses and how far physics may vary:
-                "ur5e", "ur5e-authors" or "gantry", see `profiles.PROFILES`.
+                "ur5e", "ur5e-authors" or "gantry", or a file,
+                see `profiles.find_profile`.
             observe: "velocity" (in the ideal profile), "history" (in the others),
                 "estimate" or "pixels", see `observable.OBSERVE`.
             goals: "flat" or "dict".
@@ -70,6 +72,8 @@ def build_world(
                 backend's own); not for numba, which has none.
             max_cycles: length of an episode in control steps.
             options: the scenario's own fields.
+            rig: file of a real table's devices and their calibration, for the backend
+                "real" alone, see `rig.Rig`.
 
     Raises:
         UnknownKeywordError: a keyword that is none of these; TypeError and ValueError.
@@ -98,7 +102,10 @@ def build_world(
     _check_times(control_dt, substeps, max_cycles)
     profile = keywords.get("profile", "ideal")
     given = keywords.get("physics")
-    physics = Physics(scene.defaults, profile, given, arms=not kind.ideal)
+    backend = kind(scene, num_worlds, control_dt, substeps)
+    physics = Physics(
+        scene.defaults, profile, given, arms=not kind.ideal, real=kind.realtime
+    )
     usual = "velocity" if profile == "ideal" else "history"
     agents = [f"paddle_{i}" for i in range(len(scene.seats))]
     drivers: dict[int, Driver] = {}
@@ -108,16 +115,31 @@ def build_world(
     for agent, driver in given_drivers.items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
-        drivers[agents.index(agent)] = make_agent(driver)
+        drivers[agents.index(agent)] = seated = make_agent(driver)
+        refuse_erratic(agent, seated, kind.realtime)
+    if kind.realtime:
+        backend.expect(Physics(scene.defaults, profile, given, arms=not kind.ideal))
+    if kind.realtime or "rig" in keywords:
+        backend.connect(keywords.get("rig", ""))
     return World(
         game,
-        kind(scene, num_worlds, control_dt, substeps),
+        backend,
         drivers,
         physics,
         keywords.get("observe", usual),
         max_cycles,
         autoreset,
     )
+
+
+def refuse_erratic(agent: str, driver: Driver, realtime: bool) -> None:
+    """Do nothing if a driver may move what a backend moves.
+
+    Raises:
+        ValueError: it is erratic, and a real arm would follow it.
+    """
+    if realtime and driver.erratic:
+        raise ValueError(f"{agent}: {driver!r} must not move a real arm")
 
 
 def compile_world(scenario: str | Scenario, keywords: Keywords) -> None:

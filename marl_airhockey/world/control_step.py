@@ -42,9 +42,8 @@ class Moment(NamedTuple):
         """Begin to count anew in some worlds, by index, from paddles at rest."""
         counts = (*self.episode.running, self.limited.acceleration)
         clear_rows(worlds, tuple(x.reshape(len(x), -1) for x in counts))
-        if self.ordered is not self.limited:
-            self.ordered.velocity[worlds] = self.state.paddle_velocity[worlds]
-            self.ordered.acceleration[worlds] = self.rate[worlds] = 0.0
+        self.ordered.velocity[worlds] = self.state.paddle_velocity[worlds]
+        self.ordered.acceleration[worlds] = self.rate[worlds] = 0.0
 
 
 class ControlStep:
@@ -140,7 +139,8 @@ class ControlStep:
         state, physics = before.state, before.episode.physics
         top, reach = physics["paddle_speed"], self._reach
         shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
-        moved = state.position, state.velocity, before.limited.acceleration
+        last = before.limited.velocity if self._backend.late else state.velocity
+        moved = state.position, last, before.limited.acceleration
         if not self._lags:
             given = self.action, self.prescribed, moved
             return [limits_stage(*given, *shared, after.limited)]

@@ -5,11 +5,13 @@ A camera sees pucks and blocks; paddles report themselves, as robots do.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from marl_airhockey.contracts.observable import FRAMES, HISTORY, PENDING
+from marl_airhockey.core.estimator import Estimator
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.rng import RandomStreams, StreamSet
 from marl_airhockey.core.scene import Scene
@@ -17,7 +19,6 @@ from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
 from marl_airhockey.world.calibration import CalibrationMap
 from marl_airhockey.world.delay import ALL, Rows, WayDelay
-from marl_airhockey.world.estimator import Estimator
 from marl_airhockey.world.occlusion import Occlusion
 
 SENSED = (
@@ -80,6 +81,8 @@ class Sensor:
         """True if these three are kept, as an observation needs them."""
         self.estimates = False
         """True if pucks are estimated, as an observation needs it."""
+        self.sight: Callable[[], Array] | None = None
+        """What a real camera sees, see `Backend.sight`; None for a simulated one."""
 
     def past(self, rows: Rows = ALL) -> dict[str, Array]:
         """Return ``history`` and ``asked`` of some worlds, by name."""
@@ -177,8 +180,11 @@ class Sensor:
             )
             age = state.time[:, None] - self._taken[:, : self.pucks]
         if self.keeps_history:
-            seen = np.stack([sensed.visible, age], -1)
-            newest = np.concatenate([sensed.puck, seen], -1)
+            if self.sight is None:
+                seen = np.stack([sensed.visible, age], -1)
+                newest = np.concatenate([sensed.puck, seen], -1)
+            else:
+                newest = self.sight()
             for kept, new in ((self.history, newest), (self.frames, sensed.position)):
                 past = kept[rows]
                 kept[rows] = np.concatenate([past[:, 1:], new[rows][:, None]], 1)

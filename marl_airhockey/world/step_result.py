@@ -34,6 +34,8 @@ class StepResult:
     """(B, open) bool, latched for the episode"""
     first_shot: Array
     """(B,) bool: succeeded before a second distinct touch"""
+    interruption: str = ""
+    """Reason for which a real table had to end the episode"""
     final_observation: Observation | None = None
     """Observations at the end of the episodes that ended, rows of all others stale;
     None if none ended or worlds do not restart by themselves"""

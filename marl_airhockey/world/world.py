@@ -61,6 +61,8 @@ class World:
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = ReachPlanes.of(scene.table, scene.seats)
         self.sensor = Sensor(scene, b, physics, dt)
+        if backend.realtime:
+            self.sensor.sight = backend.sight
         self.observer = Observer(scenario, self.sensor, physics, observe)
         self.driven = [
             DrivenSeat(seat, driver, self.observer, b, dt)
@@ -107,6 +109,11 @@ class World:
         return self._built.action.copy()
 
     @property
+    def asked(self) -> Array:
+        """(B, seats, 2) actions of the last step, before their delay; a copy."""
+        return self._actions.asked(self._built).copy()
+
+    @property
     def command(self) -> Array:
         """(B, seats, 2) command of the last step, table frame, m/s; a copy."""
         return self._built.now.limited.velocity.copy()
@@ -125,6 +132,18 @@ class World:
     @max_cycles.setter
     def max_cycles(self, cycles: int) -> None:
         self._limit[:] = cycles
+
+    @property
+    def outcome(self) -> dict[str, Array]:
+        """Outcome of the last step for all seats, and ends of episodes; copies.
+
+        ``reward`` (B, seats), ``applied_action`` (B, seats, 2), ``violation``
+        (B, seats, 5), and (B,) ``terminated`` and ``truncated``.
+        """
+        now = self._built.now
+        names = "reward", "applied_action", "terminated", "truncated"
+        parts = {name: now.verdict.outcome[name].copy() for name in names}
+        return parts | {"violation": now.ordered.violation.copy()}
 
     @property
     def _built(self) -> ControlStep:
@@ -178,6 +197,21 @@ class World:
 
     def reset_worlds(self, worlds: Array) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
+        rng = self.draw_worlds(worlds)
+        if self.backend.realtime:
+            # All is compiled now, so that no time is lost once the puck moves.
+            state = self.backend.arrange(self._state)
+            memory = self.scenario.initial_memory(state, rng)
+            self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
+        for seat in self.driven:
+            seat.reset(worlds, self.seeds, self._episode.number)
+
+    def draw_worlds(self, worlds: Array) -> RandomStreams:
+        """Draw how a new episode begins in some worlds, by index (W,).
+
+        On a real table, where somebody has still to bring it about, that is all.
+        Returns the streams from which the start is drawn.
+        """
         number = self._episode.number
         number[worlds] += 1
         self._streams.renew(worlds, self.seeds, number)
@@ -189,8 +223,7 @@ class World:
         rng = self._streams.of("start", worlds)
         state, memory = self.scenario.reset(rng, len(worlds))
         self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
-        for seat in self.driven:
-            seat.reset(worlds, self.seeds, number)
+        return rng
 
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
@@ -275,18 +308,24 @@ class World:
         """Return what the open seats are shown now, freshly allocated."""
         return self.observer.read(self._sensed, self._memory, self.open)
 
-    def step(self, actions: Array) -> StepResult:
+    def observe(self, seats: Array) -> Observation:
+        """Return what seats (n,) would be shown as open ones, freshly allocated."""
+        return self.observer.read(self._sensed, self._memory, seats)
+
+    def step(self, actions: Array, prescribed: Array | None = None) -> StepResult:
         """Move all worlds by one control step.
 
         Args:
             actions: (B, open, 2) velocities, fractions of top speed in ego frames.
+            prescribed: (B, open, 4) measured position and velocity of paddles, ego
+                frames, m and m/s; nan for seats that ask. None: all ask.
 
         Raises:
             RuntimeError: before the first `reset`.
             ValueError: a wrong shape, or an element that is not finite.
         """
         now = self._sensed, self._memory, self._episode
-        self._actions.collect(self._built, actions, *now)
+        self._actions.collect(self._built, actions, prescribed, *now)
         if self.sensor.keeps_history:
             self.sensor.note(self._actions.asked(self._built))
         moment = self._built()
@@ -303,6 +342,9 @@ class World:
 
     def _finish_step(self, moment: Moment, result: StepResult) -> None:
         """Sense, serve inside episodes, observe, and reset the worlds that ended."""
+        if self.backend.realtime and self.backend.interruption:
+            result.interruption = self.backend.interruption
+            result.truncated[:] = True
         self._sense()
         if self.scenario.goals == "dict" and not self.sensor.ideal:
             judge_sensed(self.scenario, self._sensed, moment, self._limit, result)

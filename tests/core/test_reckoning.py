@@ -43,7 +43,9 @@ def test_a_corner_returns_both_ways_and_a_long_flight_stays_inside():
     assert (np.abs(there) <= (0.9 + 1e-9, 0.4 + 1e-9)).all()
 
 
-@pytest.mark.parametrize("name", ["duel", "free_for_all"])
+@pytest.mark.parametrize(
+    "name", ["duel", pytest.param("free_for_all", marks=pytest.mark.slow)]
+)
 def test_it_is_what_a_world_does_but_for_drag_and_spin(name, backend):
     world = ah.make_world(name, 200, backend=backend)
     world.reset(0)

@@ -132,8 +132,23 @@ class Estimator:
         past = self._paddles[worlds]
         past[:, :-1], past[:, -1] = past[:, 1:].copy(), paddles
         self._paddles[worlds] = past
+        self.update_along(worlds, seen, taken, fresh, past, now)
+
+    def update_along(
+        self,
+        worlds: Array,
+        seen: Array,
+        taken: Array,
+        fresh: Array,
+        paddles: Array,
+        now: Array,
+    ) -> None:
+        """Do what `update` does, with the ways (W, n, S, 2) of paddles given.
+
+        Their places are a control step apart, the last is that of now.
+        """
         _update(
-            *(worlds, seen, taken, fresh, past, now, self._known),
+            *(worlds, seen, taken, fresh, paddles, now, self._known),
             *(self._mean, self._spread, self._taken, self._doubted),
             self.now,
         )

@@ -1,0 +1,118 @@
+"""Shadow of a person's hand: the paddle follows one that a camera sees elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from marl_airhockey.devices.hand import Hand, HandMotion
+from marl_airhockey.devices.hand_rig import HandRig
+from marl_airhockey.toolkit import (
+    Array,
+    Driver,
+    PrescribedMotion,
+    RandomStreams,
+    Seat,
+    View,
+    length,
+)
+from marl_airhockey.toolkit.pointing import ARM_LAG, point_to
+
+CATCH = 0.08
+"""Distance from the paddle, m, within which a hand that comes into the picture must
+come before the paddle follows it"""
+
+
+class Shadow(Driver):
+    """Driver that follows a paddle which a person moves under a camera of its own.
+
+    The field that this camera sees is stretched over the seat's reach. The paddle
+    *asks* for what brings it to where the hand is, within its limits, once the hand has
+    come to where the paddle is; with ``prescribe`` it *is* where the hand is, which
+    needs a simulated seat. A hand that leaves the picture leaves the paddle at rest.
+
+    Args:
+        rig: file of the hand's camera, ``airhockey calibrate --hand`` writes it.
+        prescribe: whether the hand itself is the paddle.
+        lag: time by which the arm answers late, see `point_to`, s.
+
+    Raises:
+        ValueError: no rig, or one that cannot be read.
+    """
+
+    led = True
+
+    def __init__(self, rig: str, prescribe: bool = False, lag: float = ARM_LAG) -> None:
+        self._rig = HandRig.load(Path(rig))
+        self._prescribe, self._lag = prescribe, lag
+        self._hand: Hand | None = None
+        self._low, self._high = np.zeros(2), np.zeros(2)
+        self._place = np.full(2, np.nan)
+        self._caught = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_hand": None}
+
+    def __enter__(self) -> Self:
+        self._open()
+        return self
+
+    def _open(self) -> Hand:
+        """Return the hand's camera; a copy of a driver gets one of its own."""
+        if self._hand is None:
+            self._hand = Hand(self._rig).__enter__()
+        return self._hand
+
+    @property
+    def trouble(self) -> str:
+        hand = self._open()
+        if hand.trouble or self._prescribe or self._caught:
+            return hand.trouble
+        return "bring the hand's paddle to where the arm's is"
+
+    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+        reach = np.asarray(seat.reach)
+        self._low, self._high = reach.min(0), reach.max(0)
+        self._place, self._caught = reach.mean(0), False
+        return {}
+
+    def _target(self, motion: HandMotion) -> tuple[Array, Array]:
+        """Return place and velocity of the hand's paddle, stretched over the reach."""
+        stretch = (self._high - self._low) / np.array(self._rig.size)
+        middle = (self._high + self._low) / 2
+        place = np.clip(middle + stretch * motion.place, self._low, self._high)
+        return place, stretch * motion.velocity
+
+    def measured(self) -> PrescribedMotion | None:
+        """Return (1, 4) where the hand's paddle is, if it prescribes; else None."""
+        if not self._prescribe:
+            return None
+        motion = self._open().read()
+        velocity = np.zeros(2)
+        if motion is not None:
+            self._place, velocity = self._target(motion)
+        return np.concatenate([self._place, velocity])[None]
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        own = view.state.paddle[:, view.seat]
+        motion = self._open().read()
+        if motion is None:
+            self._caught = False
+            return np.zeros_like(own), memory
+        place, velocity = self._target(motion)
+        self._caught |= bool((length(place - own) < CATCH).all())
+        if not self._caught:
+            return np.zeros_like(own), memory
+        return point_to(view, place, velocity, self._lag), memory
+
+    def __exit__(self, *_: object) -> None:
+        if self._hand is not None:
+            self._hand.__exit__(None, None, None)
+            self._hand = None
+
+
+make = Shadow

@@ -1,0 +1,5 @@
+"""Real backend: a table with a camera over it and an arm at its home side."""
+
+from marl_airhockey.backends.real.backend import RealBackend
+
+make = RealBackend

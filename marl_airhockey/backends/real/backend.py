@@ -1,0 +1,356 @@
+"""Real backend: camera and robot make the state; steps take as long as they last."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from marl_airhockey.backends.real.operator import make_operator
+from marl_airhockey.backends.real.overlay import Overlay
+from marl_airhockey.backends.real.tracker import Tracker
+from marl_airhockey.contracts.backend import Backend, Command
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.devices.camera import Camera, open_source
+from marl_airhockey.devices.rig import Rig
+from marl_airhockey.devices.robot import DriverState, Fault, Robot, RobotError
+from marl_airhockey.devices.robot.limits import check_reach, read_limits
+from marl_airhockey.devices.vision import Detector, Sighting
+from marl_airhockey.devices.vision.calibration import find_tags, moved
+from marl_airhockey.devices.vision.rectifier import Rectifier
+from marl_airhockey.devices.vision.watcher import Watcher
+from marl_airhockey.jit.pipeline import Stage
+from marl_airhockey.types import Array
+
+MOVED = 2.0
+"""Error of the tags, px, at which the camera is not where it was calibrated"""
+BLIND = 0.3
+"""Time without a picture after which an episode ends, s"""
+LOST = 2.0
+"""Time for which a puck may be unseen, s"""
+FIRST = 3
+"""Number of sightings with which an episode begins"""
+PLACING = 30.0
+"""Longest time until a placed puck is seen, s"""
+APART = 0.08
+"""Distance from where it is wanted at which a placed puck is accepted, m"""
+
+
+class RealBackend(Backend):
+    """Backend of one real table: a puck that a camera sees, a paddle that an arm moves.
+
+    A step sends a command, waits until it is over and returns what is then there: the
+    paddle as the arm tells it, the puck as a filter that knows the table makes it out
+    of all pictures until then. When the robot stops, or no picture or puck is seen for
+    too long, the paddle brakes and `interruption` says why.
+    """
+
+    exact: ClassVar[bool] = False
+    ideal: ClassVar[bool] = False
+    realtime: ClassVar[bool] = True
+    late: ClassVar[bool] = True
+    timestep: ClassVar[float | None] = None
+    cameras: ClassVar[tuple[str, ...]] = ("table", "rectified")
+
+    def __init__(
+        self,
+        scene: Scene,
+        num_worlds: int,
+        control_dt: float,
+        substeps: int | None = None,
+    ) -> None:
+        if num_worlds != 1:
+            raise ValueError(
+                f"num_worlds: {num_worlds}; there is one real table, so one world"
+            )
+        super().__init__(scene, num_worlds, control_dt, substeps)
+        self._devices = ExitStack()
+        self._robot: Robot | None = None
+        self._reason = ""
+        self._due = 0.0
+        self._began = self._moment = 0.0
+        self._asked = np.zeros(2)
+        self._allowed = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        raise TypeError("a real table cannot be copied or sent to another process")
+
+    @classmethod
+    def supports(cls, scene: Scene) -> str | None:
+        if len(scene.seats) != 1:
+            return (
+                "it has one arm, and nobody else may reach into its way; games for "
+                "more seats are played in simulation"
+            )
+        if scene.blocks or scene.obstacles:
+            return "there are no blocks on the real table; leave them to a simulation"
+        if scene.pucks > 1:
+            return f"there is one puck on the real table, not {scene.pucks}"
+        if scene.path:
+            return "it needs to know where pucks are between the camera's pictures"
+        if scene.physics.get("tilt") == 0.0:
+            return "the real table is tilted, and this task is for a flat one"
+        if scene.table not in TABLES.values():
+            return "the table is none of the presets"
+        return None
+
+    def connect(self, rig: str) -> None:
+        if not rig:
+            raise ValueError(
+                'backend "real": name the file of the devices, rig= or --rig '
+                "(airhockey calibrate writes it), or take the virtual lab, --lab"
+            )
+        self.rig = Rig.load(Path(rig))
+        table = TABLES[self.rig.table]
+        if self.scene.table != table:
+            raise ValueError(
+                f"the rig's table is {self.rig.table!r}; play with "
+                f'options={{"table": "{self.rig.table}"}} or --option '
+                f"table={self.rig.table}"
+            )
+        self.operator = make_operator(self.rig.operator)
+        config = self.rig.driver_config(self.scene.seats[0].reach)
+        try:
+            self._camera = self._devices.enter_context(
+                Camera(open_source(self.rig.camera, self.rig.latency))
+            )
+            self._check_camera()
+            half = tuple(float(x) for x in table.size / 2)
+            detector = Detector(
+                *(self.rig.view, self.rig.puck, table.puck_radius, half),  # type: ignore[arg-type]
+                readout=self.rig.readout,
+            )
+            self._overlay = Overlay(self.rig.view, table)
+            self.rectifier = Rectifier(self.rig.view, table.size)
+            self._check_arm()
+            self.watcher = Watcher(self._camera, detector)
+            self._devices.callback(self.watcher.close)
+            self._robot = self._devices.enter_context(Robot(config))
+        except BaseException:
+            self._devices.close()
+            raise
+
+    def _check_camera(self) -> None:
+        frame = self._camera.next(seconds=3.0)
+        if frame is None:
+            raise RuntimeError(f"{self._camera.trouble}: is {self.rig.camera} right?")
+        off = moved(self.rig.view, find_tags(frame.image), self.rig.known_tags)
+        if off > MOVED:
+            raise RuntimeError(
+                f"camera: the tags are {off:.1f} px from where they were; it was moved "
+                "or the table was: calibrate anew"
+            )
+
+    def _check_arm(self) -> None:
+        """Refuse a reach in which joints come to the limits that the arm tells."""
+        try:
+            joints = read_limits(self.rig.robot)
+        except OSError as error:
+            raise RuntimeError(
+                f"robot at {self.rig.robot}: no arm answers ({error}); is it switched "
+                "on, in remote control, and in this network?"
+            ) from error
+        check_reach(
+            *(joints, self.rig.mounting, np.array(self.rig.tool)),
+            *(np.array(self.scene.seats[0].reach), self.rig.limits.speed),
+        )
+
+    def expect(self, physics: Physics) -> None:
+        self._tracker = Tracker(self.scene, physics)
+
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        """Do nothing: the table is what it is."""
+
+    @property
+    def robot(self) -> Robot:
+        """Robot that moves the paddle."""
+        if self._robot is None:
+            raise RuntimeError('backend "real": connect() comes first')
+        return self._robot
+
+    @property
+    def camera(self) -> Camera:
+        """Camera over the table."""
+        return self._camera
+
+    @property
+    def interruption(self) -> str:
+        return self._reason
+
+    def arrange(self, state: State) -> State:
+        self._reason = ""
+        self._tracker.forget()
+        if not self._allowed:
+            self.operator.begin(self.rig.motion_words(self.scene.seats[0].reach))
+            self._allowed = True
+        try:
+            self._ready_robot()
+            self.robot.go_to(state.paddle[0, 0])
+        except RobotError as error:
+            raise RuntimeError(str(error)) from error
+        seen: list[Sighting] = []
+        if self.scene.pucks:
+            wanted = state.puck[0, 0], state.puck_velocity[0, 0]
+            self.operator.place(*wanted)
+            self._await_puck(wanted[0])
+            self.operator.release()
+            seen = self._first_sightings()
+        self.robot.enable()
+        self._began = self._due = time.monotonic()
+        begun = self.scene.still_state(1)
+        if seen:
+            self._tracker.begin(seen, self.robot.track[-1, 1:])
+        self._fill(begun, self._began, self._began)
+        begun.time[:] = 0.0
+        return begun
+
+    def _ready_robot(self) -> None:
+        """Let a robot that has stopped go on, on the operator's word.
+
+        Raises:
+            RobotError: it does not.
+        """
+        robot = self.robot
+        while robot.state is DriverState.FAULT or not robot.alive:
+            self.operator.allow(robot.fault.words)
+            if robot.fault is Fault.EMERGENCY_STOP:
+                # Released at the pendant, by a person, or there is no connection.
+                robot.close()
+                robot.connect()
+            else:
+                robot.recover()
+
+    def _await_puck(self, wanted: Array) -> None:
+        """Wait until the placed puck is seen near where it is wanted.
+
+        Raises:
+            RuntimeError: it is not.
+        """
+        until, far = time.monotonic() + PLACING, float("inf")
+        began = time.monotonic()
+        while time.monotonic() < until:
+            self.robot.command(np.zeros(2), 0.0)
+            last = self.watcher.last
+            if last is not None and last.taken > began:
+                far = float(np.linalg.norm(last.place - wanted))
+                if far < APART:
+                    return
+            time.sleep(0.02)
+        where = "not seen" if not np.isfinite(far) else f"seen {far:.2f} m from there"
+        raise RuntimeError(
+            f"the puck is {where} within {PLACING:.0f} s (wanted at "
+            f"{np.round(wanted, 2)} m); {self._camera.trouble or 'is it there?'}"
+        )
+
+    def _first_sightings(self) -> list[Sighting]:
+        """Return the first sightings of a puck that was let go just now."""
+        self.watcher.take()
+        seen: list[Sighting] = []
+        until = time.monotonic() + LOST
+        while len(seen) < FIRST and time.monotonic() < until:
+            self.robot.command(np.zeros(2), 0.0)
+            time.sleep(0.005)
+            seen += self.watcher.take()
+        if len(seen) < FIRST:
+            raise RuntimeError("the puck was not seen any more once it was let go")
+        return seen
+
+    def stage(self, command: Command, before: State, after: State) -> Stage:
+        return Stage(self._move, (command, before, after))
+
+    def _move(self, command: Command, before: State, after: State) -> None:
+        """Send the command, wait for the end of the step and fill ``after``."""
+        self._asked = command.velocity[0, 0].copy()
+        self.robot.command(self._asked, self.control_dt)
+        self._due += self.control_dt
+        left = self._due - time.monotonic()
+        if left > 0:
+            time.sleep(left)
+        elif left < -2 * self.control_dt:
+            # What was missed is not made up for by a hurry.
+            self._due = time.monotonic()
+        now = time.monotonic()
+        for name in ("touched", "banked", "crossed", "crossed_velocity", "lifted"):
+            getattr(after, name)[:] = 0
+        after.touched_at[:] = np.nan
+        self._fill(after, now, now - self.control_dt)
+        after.time[:] = before.time + self.control_dt
+        self._reason = self._reason or self._trouble(now)
+        if self._reason:
+            self.robot.disable()
+
+    def _trouble(self, now: float) -> str:
+        """Return why the episode cannot go on; "" if it can."""
+        robot = self.robot
+        if not robot.alive:
+            return "robot: its driver has ended"
+        if robot.state in (DriverState.FAULT, DriverState.HOLD):
+            return f"robot: {robot.fault.words}"
+        if self.scene.pucks and self._camera.age > BLIND:
+            return self._camera.trouble
+        last = self._tracker.last
+        if last is not None and now - last.time > LOST:
+            return f"puck: not seen for {LOST:.0f} s"
+        return ""
+
+    def _fill(self, state: State, now: float, since: float) -> None:
+        """Fill a state with what is there now, and what happened since a moment."""
+        self._moment = now
+        status = self.robot.status
+        state.position[0, 0] = status.x, status.y
+        state.velocity[0, 0] = status.vx, status.vy
+        if self.scene.pucks:
+            seen = self.watcher.take()
+            self._tracker.fill(state, seen, self.robot.track, now, since)
+
+    def sight(self) -> Array:
+        return self._tracker.sight(self.watcher.looked_at)
+
+    def telemetry(self) -> dict[str, Any]:
+        status, camera, last = self.robot.status, self._camera, self._tracker.last
+        return {
+            "moment": self._moment,
+            "robot": self.robot.state.name,
+            "fault": self.robot.fault.words,
+            "asked": [round(float(x), 4) for x in self._asked],
+            "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
+            "sent_place": [round(status.sent_x, 4), round(status.sent_y, 4)],
+            "height_mm": round(1e3 * status.z, 2),
+            "force": round(status.force, 1),
+            "joints": [round(angle, 5) for angle in status.joints],
+            "cycles": int(status.cycles),
+            "late": int(status.late),
+            "refused": int(status.refused),
+            "camera": camera.trouble,
+            "frame_ms": round(1e3 * min(camera.age, 99.0), 1),
+            "dropped": camera.dropped,
+            "puck_ms": round(1e3 * (time.monotonic() - last.time), 1) if last else None,
+            "noise_mm": round(1e3 * self._tracker.noise, 2),
+        }
+
+    def photograph(
+        self, world: int, camera: str, marks: Sequence[Mark], width: int
+    ) -> Array:
+        frame = self._camera.newest
+        if frame is None:
+            raise RuntimeError(self._camera.trouble or "camera: no picture yet")
+        if camera == "rectified":
+            return self.rectifier.rectify(frame.image, width)[..., ::-1]
+        status = self.robot.status
+        paddle = np.array([status.x, status.y])
+        puck = self._tracker.estimate
+        return self._overlay.draw(frame.image, paddle, puck, marks, width)
+
+    def close(self) -> None:
+        if self._robot is not None and self._robot.alive:
+            self._robot.disable()
+        self._devices.close()
+        self._robot = None

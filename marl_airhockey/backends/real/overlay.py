@@ -1,0 +1,72 @@
+"""Overlay: a camera's picture with what is believed to be there drawn over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.core.table import Table
+from marl_airhockey.devices.vision.lens import View
+from marl_airhockey.types import Array
+
+CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 1)
+PUCK, PADDLE, MARK, RAIL = (255, 240, 0), (255, 140, 0), (0, 220, 120), (90, 140, 255)
+"""Colours: red, green, blue"""
+AHEAD = 0.15
+"""Time for which an arrow goes on with the puck's velocity, s"""
+
+
+class Overlay:
+    """Overlay for one view of one table.
+
+    Args:
+        view: of the camera.
+        table: that it sees.
+    """
+
+    def __init__(self, view: View, table: Table) -> None:
+        self._view, self._table = view, table
+
+    def draw(
+        self,
+        image: Array,
+        paddle: Array,
+        puck: Array | None,
+        marks: Sequence[Mark],
+        width: int,
+    ) -> Array:
+        """Return (H, W, 3) uint8 RGB, ``width`` pixels wide.
+
+        Args:
+            image: picture (H, W, 3), blue, green, red.
+            paddle: (2,) m.
+            puck: (4,) its place, m, and velocity, m/s; None if there is none.
+            marks: of the scenario.
+            width: of the result.
+        """
+        drawn = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        table = self._table
+        corners = np.asarray(table.vertices)
+        self._line(drawn, np.vstack([corners, corners[:1]]), RAIL)
+        for mark in marks:
+            if mark.kind == "circle":
+                self._line(drawn, np.array(mark.start) + mark.radius * CIRCLE, MARK)
+            else:
+                self._line(drawn, np.array([mark.start, mark.end]), MARK)
+        self._line(drawn, paddle + table.paddle_radius * CIRCLE, PADDLE)
+        if puck is not None:
+            self._line(drawn, puck[:2] + table.puck_radius * CIRCLE, PUCK)
+            self._line(drawn, np.stack([puck[:2], puck[:2] + AHEAD * puck[2:]]), PUCK)
+        height = round(width * image.shape[0] / image.shape[1])
+        if width != image.shape[1]:
+            drawn = cv2.resize(drawn, (width, height), interpolation=cv2.INTER_AREA)
+        return np.asarray(drawn)
+
+    def _line(self, image: Array, points: Array, colour: tuple[int, int, int]) -> None:
+        """Draw a line through points (n, 2) on the table."""
+        flat = np.column_stack([points, np.zeros(len(points))])
+        pixels = np.round(self._view.project(flat) * 16).astype(np.int32)
+        cv2.polylines(image, [pixels], False, colour, 2, cv2.LINE_AA, 4)

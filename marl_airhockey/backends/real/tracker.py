@@ -1,0 +1,155 @@
+"""Tracker: the puck's state, made of what a camera has seen and an arm has told."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from marl_airhockey.backends.real.events import Track, find_contacts
+from marl_airhockey.core.estimator import Estimator
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.devices.vision import Sighting
+from marl_airhockey.types import Array
+
+WAY, PAST = 0.01, 40
+"""Time between two places of the paddle, s, and number of those behind that of now"""
+SMOOTHED = 0.05
+"""Share of the newest sighting in the mean distance from the estimate"""
+WORLD = np.zeros(1, np.int64)
+"""Index of the one world"""
+
+
+class Tracker:
+    """Tracker of the puck of one table.
+
+    Args:
+        scene: of the table.
+        physics: ranges in which the table's may lie.
+    """
+
+    def __init__(self, scene: Scene, physics: Physics) -> None:
+        self._scene = scene
+        self._estimator = Estimator(scene, 1, physics, WAY)
+        self._touching = False
+        self.last: Track | None = None
+        """Newest sighting, filtered; None before an episode begins."""
+        self.noise = 0.0
+        """Mean distance of sightings from what the filter makes of them, m."""
+        if scene.pucks:
+            # Compiled here, not while a puck is on its way.
+            nowhere = np.zeros(2)
+            self.begin([Sighting(nowhere, 0.0, 1.0, nowhere)], nowhere)
+            self._update(nowhere, 0.1, True, np.zeros((2, 3)), 0.1)
+        self.forget()
+
+    def forget(self) -> None:
+        """Know of no puck until an episode begins."""
+        self.last, self._touching, self.noise = None, False, 0.0
+
+    def begin(self, seen: list[Sighting], paddle: Array) -> None:
+        """Begin with the first sightings of an episode, and the paddle (2,) now, m."""
+        first, last = seen[0], seen[-1]
+        velocity = (last.place - first.place) / max(last.taken - first.taken, 1e-3)
+        self._estimator.reset(
+            WORLD,
+            last.place.reshape(1, 1, 2),
+            velocity.reshape(1, 1, 2),
+            np.full((1, 1), last.taken),
+            paddle.reshape(1, 1, 2),
+        )
+        self.last = Track(last.taken, last.place, velocity)
+
+    @property
+    def estimate(self) -> Array | None:
+        """(4,) x, y, m, and vx, vy, m/s, of the puck; None if there is none."""
+        return None if self.last is None else self._estimator.now[0, 0, :4].copy()
+
+    def fill(
+        self,
+        state: State,
+        seen: list[Sighting],
+        track: Array,
+        now: float,
+        since: float,
+    ) -> None:
+        """Fill a state with the puck that is there now, and what it has met.
+
+        Args:
+            state: of one world, without contacts.
+            seen: what was seen since the last call.
+            track: (n, 3) time and places of the paddle.
+            now: time of the state, s.
+            since: time at which its step began, s.
+        """
+        for sighting in seen:
+            self._follow(state, sighting, track, now, since)
+        self._update(np.zeros(2), 0.0, False, track, now)
+        seats = self._scene.bodies.paddles
+        x, y, vx, vy, edge = self._estimator.now[0, 0]
+        state.position[0, seats] = x, y
+        state.velocity[0, seats] = vx, vy
+        state.spin[0, seats] = edge / self._scene.table.puck_radius
+        state.touching[0, 0, 0] = self._touching
+
+    def _follow(
+        self,
+        state: State,
+        sighting: Sighting,
+        track: Array,
+        now: float,
+        since: float,
+    ) -> None:
+        """Take a sighting into the estimate and note what the puck met before it."""
+        last, taken = self.last, sighting.taken
+        if last is not None and taken <= last.time:
+            return
+        # What the filter makes of it then, for the moment of the picture itself.
+        self._update(sighting.place, taken, True, track, taken)
+        found = self._estimator.now[0, 0]
+        new = self.last = Track(taken, found[:2].copy(), found[2:4].copy())
+        off = float(np.linalg.norm(new.place - sighting.place))
+        self.noise += SMOOTHED * (off - self.noise)
+        if last is None:
+            return
+        met = find_contacts(self._scene, last, new, track[:, 0], track[:, 1:])
+        touching = bool(np.isfinite(met.paddle_at))
+        if touching and not self._touching:
+            state.touched[0, 0, 0] += 1
+            # Before 0, as it was seen later than it was.
+            state.touched_at[0, 0, 0] = min(met.paddle_at, now) - since
+        self._touching = touching
+        state.banked[0, 0] += met.banks
+        for k, line in enumerate(self._scene.goal_lines):
+            if line.width is None and met.banks[line.side]:
+                state.crossed[0, 0, k] = True
+                state.crossed_velocity[0, 0, k] = met.velocity
+
+    def _update(
+        self, place: Array, taken: float, fresh: bool, track: Array, now: float
+    ) -> None:
+        ago = now - WAY * np.arange(PAST, -1, -1)
+        ways = np.stack([np.interp(ago, track[:, 0], track[:, k]) for k in (1, 2)], -1)
+        self._estimator.update_along(
+            WORLD,
+            place.reshape(1, 1, 2),
+            np.full(1, taken),
+            np.full((1, 1), fresh),
+            ways.reshape(1, -1, 1, 2),
+            np.full(1, now),
+        )
+
+    def sight(self, looked_at: float) -> Array:
+        """Return (1, pucks, 4) x, y, m, visibility and age, s, in the newest picture.
+
+        Args:
+            looked_at: when that was taken, s.
+        """
+        last, age, place, visible = self.last, 0.0, np.zeros(2), 0.0
+        if last is not None:
+            age, place = time.monotonic() - last.time, last.place
+            visible = float(looked_at - last.time < 1e-3)
+        row = np.array([*place, visible, age]).reshape(1, 1, 4)
+        return np.repeat(row, self._scene.pucks, axis=1)

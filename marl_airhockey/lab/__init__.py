@@ -1,0 +1,1 @@
+"""Virtual lab: a simulated table that speaks the protocols of the real one."""

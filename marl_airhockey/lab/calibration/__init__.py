@@ -1,0 +1,1 @@
+"""Calibration: from a camera, printed tags and an arm to a rig's file."""

@@ -1,0 +1,186 @@
+"""Calibration of the lab's rig, as it is done at a real table.
+
+Nothing is known that could not be measured there, but for the lens, which is the
+maker's.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from datetime import date
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.devices.camera import Camera, Frame, open_source
+from marl_airhockey.devices.hand_rig import HandRig
+from marl_airhockey.devices.rig import Rig
+from marl_airhockey.devices.robot.mounting import fit_mounting
+from marl_airhockey.devices.vision import Colour
+from marl_airhockey.devices.vision.calibration import (
+    find_tags,
+    tag_corners,
+    view_from_tags,
+)
+from marl_airhockey.jit.codegen import cache_folder
+from marl_airhockey.lab.camera import PADDLE_TOP
+from marl_airhockey.lab.hand_camera import FIELD, hand_tag_places, hand_view
+from marl_airhockey.lab.lab import Lab, LabClient, served
+from marl_airhockey.lab.table_camera import lab_view, tag_places
+from marl_airhockey.types import Array
+
+PICTURES = 8
+"""Pictures over which the corners of tags are averaged"""
+CLICKED = np.array([[0.3, 0.0, 0.003]])
+"""Place at which the puck lies while its colour is clicked, m"""
+RIM, DIRECTIONS = 0.034, 16
+"""Distance from the middle of the arm's paddle to where it may be clicked, m, and the
+number of directions: wherever the arm stands, it leaves some of them free"""
+REACH = 3
+"""Distance from a click up to which the colour of the paddle counts, px: the arm may
+leave no more of it free"""
+GRIPPED = np.array([[0.028, 0.0, PADDLE_TOP]])
+"""Place at which the hand's paddle is clicked, m"""
+
+
+def calibrate_lab(client: LabClient) -> Rig:
+    """Return the rig of a lab.
+
+    Raises:
+        RuntimeError: the lab has ended.
+        CameraError: it shows no pictures.
+        ValueError: what is seen does not fit together.
+    """
+    info, survey = client.ask("info"), client.ask("survey")
+    table = TABLES[info["table"]]
+    known = {k: tag_corners(place) for k, place in tag_places(table).items()}
+    source = f"stream:{info['camera']}"
+    client.ask("place", puck=CLICKED[0, :2].tolist(), velocity=[0.0, 0.0])
+    time.sleep(0.2)
+    with Camera(open_source(source)) as camera:
+        frames = _take(camera, PICTURES)
+    view = view_from_tags(_steady_tags(frames), known, lab_view(table).lens)
+    # What a person would click: the puck, and what the arm leaves free of its paddle.
+    x, y = view.project(CLICKED)[0]
+    u, v = _most_coloured(frames[-1].image, view.project(_rim(client)))
+    touched = (survey[name] for name in ("places", "touched", "tool"))
+    return Rig(
+        table=info["table"],
+        camera=source,
+        view=view,
+        puck=Colour.around(frames[-1].image, (float(x), float(y))),
+        paddle=Colour.around(frames[-1].image, (float(u), float(v)), REACH),
+        robot=info["host"],
+        mounting=fit_mounting(*(np.array(x) for x in touched)),
+        tags={str(k): four.tolist() for k, four in known.items()},
+        operator=f"lab:{client.port}",
+        made=date.today().isoformat(),
+    )
+
+
+def _rim(client: LabClient) -> Array:
+    """Return places (n, 3) on the arm's paddle that the arm may hide, m."""
+    angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
+    way = RIM * np.stack([np.cos(angles), np.sin(angles)], 1)
+    places = np.array(client.ask("truth")["paddle"][:2]) + way
+    return np.column_stack([places, np.full(len(places), PADDLE_TOP)])
+
+
+def _most_coloured(image: Array, pixels: Array) -> Array:
+    """Return the pixel of (n, 2) whose neighbourhood has the highest least saturation.
+
+    A mean would prefer a vivid neighbourhood that a shadow or the arm's edge crosses.
+    """
+    saturation = cv2.medianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2HSV), 3)[..., 1]
+    least = cv2.erode(saturation, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8))
+    x, y = np.rint(pixels).astype(int).T
+    return np.asarray(pixels[np.argmax(least[y, x])])
+
+
+def calibrate_hand(client: LabClient) -> HandRig:
+    """Return the rig of a lab's hand.
+
+    Raises:
+        RuntimeError: the lab has ended.
+        CameraError: it shows no pictures.
+        ValueError: what is seen does not fit together.
+    """
+    source = f"stream:{client.ask('hand', middle=[0.0, 0.0])['camera']}"
+    known = {k: tag_corners(place) for k, place in hand_tag_places().items()}
+    with Camera(open_source(source)) as camera:
+        frames = _take(camera, PICTURES)
+    view = view_from_tags(_steady_tags(frames), known, hand_view().lens)
+    x, y = view.project(GRIPPED)[0]
+    return HandRig(
+        camera=source,
+        view=view,
+        paddle=Colour.around(frames[-1].image, (float(x), float(y))),
+        size=FIELD,
+        tags={str(k): four.tolist() for k, four in known.items()},
+        made=date.today().isoformat(),
+    )
+
+
+def _steady_tags(frames: list[Frame]) -> dict[int, Array]:
+    """Return the mean corners of the tags that are seen in all frames."""
+    seen = [find_tags(frame.image) for frame in frames]
+    steady = set(seen[0]).intersection(*seen[1:])
+    return {k: np.mean([tags[k] for tags in seen], axis=0) for k in steady}
+
+
+@contextmanager
+def running_lab() -> Iterator[LabClient]:
+    """Give a client of the lab that runs on this machine.
+
+    If none runs, one is started, and ended at the end.
+
+    Raises:
+        RuntimeError: it does not start.
+    """
+    with ExitStack() as stack:
+        client = LabClient.find()
+        if client is None:
+            lab = stack.enter_context(Lab())
+            client = LabClient(stack.enter_context(served(lab)))
+        stack.callback(client.close)
+        yield client
+
+
+@contextmanager
+def lab_rig() -> Iterator[Path]:
+    """Give the file of the rig of the `running_lab`.
+
+    Raises:
+        RuntimeError: it does not start.
+    """
+    with running_lab() as client:
+        path = cache_folder() / f"lab-{client.port}.json"
+        calibrate_lab(client).save(path)
+        yield path
+
+
+@contextmanager
+def hand_rig() -> Iterator[Path]:
+    """Give the file of the rig of the hand in the `running_lab`.
+
+    Raises:
+        RuntimeError: it does not start.
+    """
+    with running_lab() as client:
+        path = cache_folder() / f"hand-{client.port}.json"
+        calibrate_hand(client).save(path)
+        yield path
+
+
+def _take(camera: Camera, count: int) -> list[Frame]:
+    frames: list[Frame] = []
+    while len(frames) < count:
+        frame = camera.next(frames[-1].number if frames else -1)
+        if frame is None:
+            raise RuntimeError(camera.trouble or "camera: no frames")
+        frames.append(frame)
+    return frames

@@ -1,0 +1,180 @@
+"""Camera of the lab: pictures of a simulated scene, as a real camera would take them.
+
+There is a lens, noise, shading, motion blur and shadows. What does not move is drawn
+once; in each picture only what moves is drawn anew.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Generic, TypeVar
+
+import cv2
+import numpy as np
+
+from marl_airhockey.devices.vision.boards import SQUARE, SQUARES, make_board
+from marl_airhockey.devices.vision.lens import View
+from marl_airhockey.lab.drawing import enlarged, through_lens
+from marl_airhockey.types import Array
+
+CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 49)[:-1]) for f in (np.cos, np.sin)], 1)
+FELT, FLOOR, LINES = (222, 226, 224), (70, 75, 70), (205, 190, 180)
+PADDLE = (70, 165, 60)
+"""Colours: blue, green, red"""
+NOISE = 4.0
+"""Standard deviation of a pixel's noise"""
+BANK = 6
+"""Number of different noises"""
+SHADOW = np.array([0.004, -0.006])
+"""Way of a shadow for each cm of height or so, m"""
+PADDLE_TOP = 0.06
+"""Height of a paddle's top, m"""
+AROUND = 24
+"""Pixels about what moves that are drawn anew"""
+
+What = TypeVar("What")
+"""What is before a camera in the middle of an exposure"""
+
+
+class LabCamera(ABC, Generic[What]):
+    """Camera over a simulated scene.
+
+    Args:
+        view: where it is.
+        exposure: s.
+        seed: of its noise.
+    """
+
+    def __init__(self, view: View, exposure: float = 1 / 120, seed: int = 0) -> None:
+        self.view, self._exposure = view, exposure
+        self._rng = np.random.default_rng(seed)
+        self._empty: list[Array] = []
+        self._noise: list[Array] = []
+        self._light = np.ones(1)
+        self._shown: Array | None = None
+        self.dark = False
+        """True if the lights are off, a fault"""
+        self.move(view)
+
+    @abstractmethod
+    def _draw_still(self, scene: Array, view: View) -> None:
+        """Draw what does not move."""
+
+    @abstractmethod
+    def _draw(
+        self, part: Array, seen: What, later: float, corner: tuple[int, int]
+    ) -> None:
+        """Draw what moves, a time after the middle of the exposure, s.
+
+        Args:
+            part: of the picture.
+            seen: then.
+            later: that time.
+            corner: pixel of the picture at which the part begins.
+        """
+
+    @abstractmethod
+    def _outlines(self, seen: What) -> list[Array]:
+        """Return pixels (n, 2) about each thing that moves, what hides others last."""
+
+    @abstractmethod
+    def _speed(self, seen: What) -> float:
+        """Return the speed of the fastest thing, m/s."""
+
+    def move(self, view: View) -> None:
+        """Stand elsewhere from now on."""
+        self.view = view
+        width, height = view.lens.size
+        shape = height, width
+        across = np.mgrid[0:height, 0:width][1]
+        self._light = (1 - 0.25 * ((across - 200) / width) ** 2)[..., None]
+        flat = enlarged(view)
+        drawn = np.full((*flat.lens.size[::-1], 3), FLOOR, np.uint8)
+        self._draw_still(drawn, flat)
+        self._still = through_lens(view, drawn).round().astype(np.uint8)
+        scene = self._still * self._light
+        noises = [
+            self._rng.normal(0, NOISE, (*shape, 3)).astype(np.float32)
+            for _ in range(BANK)
+        ]
+        self._noise = [n.astype(np.int16) for n in noises]
+        self._empty = [np.clip(scene + n, 0, 255).astype(np.uint8) for n in noises]
+
+    def show_board(self, number: int | None) -> None:
+        """Hold a ChArUco board before the camera, a number of ways; None for away."""
+        self._shown = None
+        if number is None:
+            return
+        rng, size = np.random.default_rng(number), np.array(SQUARES) * SQUARE
+        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * size - size / 2
+        rotation, _ = cv2.Rodrigues(rng.uniform(-0.45, 0.45, 3))
+        place = np.array([0.22 * (number % 3 - 1), 0.15 * (number // 3 % 3 - 1), 0.62])
+        board = np.column_stack([corners, np.zeros(4)]) @ rotation.T + place
+        flat = enlarged(self.view)
+        pixels, _ = cv2.projectPoints(
+            board, np.zeros(3), np.zeros(3), flat.lens.arrays[0], None
+        )
+        drawn = make_board().generateImage((700, 500))
+        ends = np.array([(0, 0), (700, 0), (700, 500), (0, 500)], np.float32) - 0.5
+        warp = cv2.getPerspectiveTransform(ends, pixels[:, 0].astype(np.float32))
+        scene = np.full((flat.lens.size[1], flat.lens.size[0], 3), FLOOR, np.uint8)
+        shape = flat.lens.size
+        sheet = cv2.warpPerspective(drawn, warp, shape, flags=cv2.INTER_AREA)
+        inside = cv2.warpPerspective(np.full_like(drawn, 255), warp, shape)
+        scene[inside > 127] = sheet[inside > 127][:, None]
+        self._shown = through_lens(self.view, scene) * self._light
+
+    def photograph(self, seen: What, number: int = 0) -> Array:
+        """Return (H, W, 3) uint8 of what is before the camera.
+
+        Args:
+            seen: in the middle of the exposure.
+            number: of the picture, which decides its noise.
+        """
+        k = number % BANK
+        if self.dark:
+            return np.asarray(np.clip(self._noise[k], 0, 255).astype(np.uint8))
+        if self._shown is not None:
+            lit = np.clip(self._shown + self._noise[k], 0, 255)
+            return np.asarray(lit.astype(np.uint8))
+        image = self._empty[k].copy()
+        for outline in self._outlines(seen):
+            x, y, right, bottom = _box(outline, image.shape, AROUND)
+            if right <= x or bottom <= y:
+                continue
+            part = self._expose(seen, (x, y, right, bottom))
+            noise = self._noise[k][y:bottom, x:right]
+            lit = part * self._light[y:bottom, x:right] + noise
+            image[y:bottom, x:right] = np.clip(lit, 0, 255)
+        return image
+
+    def _expose(self, seen: What, box: tuple[int, int, int, int]) -> Array:
+        """Return what a part of the picture sums up over the exposure."""
+        x, y, right, bottom = box
+        total = np.zeros((bottom - y, right - x, 3), np.float32)
+        # One moment for each two pixels that something moves.
+        way = self._speed(seen) * self._exposure * self.view.scale(np.zeros(2)) / 2
+        moments = int(np.clip(np.ceil(way), 1, 8))
+        for share in (np.arange(moments) + 0.5) / moments - 0.5:
+            part = self._still[y:bottom, x:right].copy()
+            self._draw(part, seen, share * self._exposure, (x, y))
+            total += part
+        return total / moments
+
+    def _disc(self, place: Array, radius: float) -> Array:
+        """Return pixels about a disc that lies at a place."""
+        around = place + 1.2 * radius * CIRCLE
+        return self.view.project(np.column_stack([around, np.zeros(len(around))]))
+
+
+def _box(
+    pixels: Array, shape: tuple[int, ...], margin: int
+) -> tuple[int, int, int, int]:
+    """Return the part of a picture about some pixels: left, top, right, bottom."""
+    low, high = pixels.min(0) - margin, pixels.max(0) + margin
+    return (
+        max(int(low[0]), 0),
+        max(int(low[1]), 0),
+        min(int(high[0]), shape[1]),
+        min(int(high[1]), shape[0]),
+    )

@@ -1,0 +1,99 @@
+"""Hand's camera: pictures of a person's hand that moves a paddle on a field."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from marl_airhockey.devices.vision.lens import Lens, View
+from marl_airhockey.lab.camera import (
+    CIRCLE,
+    FELT,
+    PADDLE,
+    PADDLE_TOP,
+    SHADOW,
+    LabCamera,
+)
+from marl_airhockey.lab.drawing import draw_polygon, fill, paste_tag, shade
+from marl_airhockey.types import Array
+
+FIELD = (0.5, 0.6)
+"""Length and width of the field, m"""
+RADIUS = 0.047625
+"""Radius of the paddle, m"""
+SKIN = (120, 150, 205)
+"""Colour: blue, green, red"""
+RIM = 0.07
+"""Distance of the tags' middles from the field's edge, m"""
+HAND_HEIGHTS = np.array([0.10, 0.10, 0.14, 0.14])
+"""Heights of the corners of hand and forearm, m"""
+
+
+def hand_view() -> View:
+    """Return the true view of the camera over the field."""
+    matrix = ((640.0, 0.0, 318.0), (0.0, 640.0, 238.0), (0.0, 0.0, 1.0))
+    lens = Lens(matrix, (-0.08, 0.03, 0.0, 0.0, 0.0), (640, 480))
+    rotation, _ = cv2.Rodrigues(np.array([np.pi - 0.05, 0.02, -0.03]))
+    vector, _ = cv2.Rodrigues(rotation)
+    x, y, z = (float(v) for v in vector[:, 0])
+    tx, ty, tz = (float(v) for v in -rotation @ np.array([0.02, -0.03, 1.25]))
+    return View(lens, (x, y, z), (tx, ty, tz))
+
+
+def hand_tag_places() -> dict[int, Array]:
+    """Return the middles (2,) of the tags about the field, m, by their numbers.
+
+    None is at the near edge, over which the arm reaches.
+    """
+    x, y = FIELD[0] / 2, FIELD[1] / 2 + RIM
+    sides = [(-0.8 * x, y), (0.8 * x, y), (-0.8 * x, -y), (0.8 * x, -y)]
+    far = [(x + RIM, 0.6 * y), (x + RIM, -0.6 * y)]
+    return {k: np.array(place) for k, place in enumerate([*sides, *far])}
+
+
+class SeenHand(NamedTuple):
+    """Hand in the middle of an exposure, field's frame."""
+
+    place: Array | None
+    """(2,) of the paddle, m; None for a hand that is away"""
+    velocity: Array
+    """(2,) m/s"""
+
+
+class HandCamera(LabCamera[SeenHand]):
+    """Camera over a field on which a hand moves a paddle."""
+
+    def _draw_still(self, scene: Array, view: View) -> None:
+        half = np.array(FIELD) / 2
+        corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+        fill(scene, view, corners * half, 0.0, FELT)
+        for number, place in hand_tag_places().items():
+            paste_tag(scene, view, number, place)
+
+    def _draw(
+        self, part: Array, seen: SeenHand, later: float, corner: tuple[int, int]
+    ) -> None:
+        if seen.place is None:
+            return
+        place = seen.place + later * seen.velocity
+        shade(part, self.view, place + 4 * SHADOW + RADIUS * CIRCLE, corner)
+        fill(part, self.view, place + RADIUS * CIRCLE, PADDLE_TOP, PADDLE, corner)
+        pixels = self.view.project(np.column_stack([_forearm(place), HAND_HEIGHTS]))
+        draw_polygon(part, pixels - corner, SKIN)
+
+    def _outlines(self, seen: SeenHand) -> list[Array]:
+        if seen.place is None:
+            return []
+        points = np.column_stack([_forearm(seen.place), HAND_HEIGHTS])
+        return [self.view.project(points), self._disc(seen.place, RADIUS)]
+
+    def _speed(self, seen: SeenHand) -> float:
+        return float(np.linalg.norm(seen.velocity))
+
+
+def _forearm(place: Array) -> Array:
+    """Return the corners (4, 2) of hand and forearm, which come from the near edge."""
+    offsets = [(-0.005, 0.02), (-0.005, -0.02), (-0.45, -0.025), (-0.45, 0.065)]
+    return np.asarray(place + np.array(offsets))

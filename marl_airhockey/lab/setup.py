@@ -1,0 +1,78 @@
+"""Setup: what stands in the virtual lab, and where; nobody outside is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey.core.seat import Seat, make_seat
+from marl_airhockey.core.table import TABLES, Table
+from marl_airhockey.devices.robot.kinematics import inverse, pose_of, vector_of
+from marl_airhockey.devices.robot.mounting import Mounting
+from marl_airhockey.lab.controller.arm import Arm, Surface
+from marl_airhockey.types import Array
+
+BEHIND = 0.22
+"""Distance of the arm's base from the table's edge, m"""
+BELOW = 0.02
+"""Height of that edge above the base, m"""
+TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
+"""Pose of the paddle's foot in the flange's frame, m and rad"""
+ELBOW_UP = (2.9, -1.13, 1.94, -2.47, -1.57, 4.48)
+"""Angles from which the search for those at the start begins, rad. With the elbow up no
+joint is faster than 0.92 pi rad/s at 0.7 m/s anywhere in the reach; with it down, the
+arm is stretched at the far end, and they are."""
+LIFT = 0.02
+"""Height of the paddle above the table when the lab opens, m"""
+
+
+@dataclass(frozen=True)
+class LabSetup:
+    """Setup of a lab: one table with an arm at its home side."""
+
+    table: str = "full_size"
+    """Name of the table's preset"""
+    tilt: float = 5.5
+    """deg"""
+    latency: float = 0.028
+    """Time from the middle of an exposure until the picture can be had, s: half of the
+    exposure, the readout and the transfer"""
+
+    @cached_property
+    def geometry(self) -> Table:
+        """Table."""
+        return TABLES[self.table]
+
+    @cached_property
+    def seat(self) -> Seat:
+        """Seat of the arm."""
+        return make_seat("robot", self.geometry, 0)
+
+    @cached_property
+    def home(self) -> Array:
+        """(2,) place at which the paddle rests, table frame, m."""
+        return np.asarray(np.mean(np.asarray(self.seat.reach), 0))
+
+    @cached_property
+    def mounting(self) -> Mounting:
+        """Where the table truly lies in the arm's base frame."""
+        c, s = np.cos(np.radians(self.tilt)), np.sin(np.radians(self.tilt))
+        rotation = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+        edge = np.array([BEHIND, 0.0, BELOW])
+        origin = edge + rotation @ (self.geometry.offsets[0], 0.0, 0.0)
+        # The tool's z points into the table, its x along it.
+        foot = np.column_stack([rotation[:, 0], -rotation[:, 1], -rotation[:, 2]])
+        return Mounting.of(origin, rotation, vector_of(foot))
+
+    def make_arm(self) -> Arm:
+        """Return the arm with its paddle above its home place."""
+        pose = pose_of(self.mounting.pose(self.home, LIFT))
+        flange = pose @ np.linalg.inv(pose_of(np.array(TOOL)))
+        found, angles = inverse(flange, np.array(ELBOW_UP), 200)
+        if not found:
+            raise ValueError(f"the arm does not reach {self.home} m on {self.table}")
+        origin = np.array(self.mounting.origin)
+        normal = np.array(self.mounting.rotation)[:, 2]
+        return Arm(angles, np.array(TOOL), Surface(origin, normal))

@@ -1,0 +1,144 @@
+"""Process of the lab's table: its physics and its camera, in real time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.devices.block import Block
+from marl_airhockey.devices.camera.camera import Frame
+from marl_airhockey.lab.frame_server import FrameServer
+from marl_airhockey.lab.setup import BEHIND, LabSetup
+from marl_airhockey.lab.table_camera import Seen, TableCamera, lab_view
+from marl_airhockey.lab.world import RATE, LabWorld
+
+LATE = 0.25
+"""Time by which the loop may lag before it gives up what it missed, s"""
+MOVED = 0.02
+"""Way of a camera that was knocked against, m"""
+
+
+class TableLoop:
+    """Loop of the table: a step of the world, and a picture when it is due.
+
+    Args:
+        setup: of the lab.
+        seed: of what this table is like.
+        frame_rate: pictures a second.
+        block: where the arm tells of its paddle.
+        server: of the pictures.
+    """
+
+    def __init__(
+        self,
+        setup: LabSetup,
+        seed: int,
+        frame_rate: float,
+        block: Block,
+        server: FrameServer,
+    ) -> None:
+        self._setup, self._block, self._server = setup, block, server
+        self.world = LabWorld(setup, seed)
+        edge = -float(setup.geometry.offsets[0])
+        base = np.array([edge - BEHIND, 0.0])
+        self._view = lab_view(setup.geometry)
+        self._camera = TableCamera(setup.geometry, self._view, base, seed=seed)
+        self._every = max(round(RATE / frame_rate), 1)
+        self._steps, self._frames, self._frozen = 0, 0, False
+        self._now = time.monotonic()
+        self._arm_then = block.read()[1:].tolist()
+        self.faults: dict[str, Callable[[bool], None]] = {
+            "frozen_camera": self._freeze,
+            "dark_camera": self._darken,
+            "moved_camera": self._knock,
+            "lost_puck": self._lose,
+        }
+
+    def _freeze(self, on: bool) -> None:
+        self._frozen = on
+
+    def _darken(self, on: bool) -> None:
+        self._camera.dark = on
+
+    def _knock(self, on: bool) -> None:
+        x, y, z = self._view.translation
+        moved = replace(self._view, translation=(x + MOVED, y, z))
+        self._camera.move(moved if on else self._view)
+
+    def _lose(self, on: bool) -> None:
+        self.world.present = not on
+
+    def step(self, now: float) -> None:
+        """Go on to a moment, s."""
+        stamp, x, y, z, vx, vy = self._block.read()
+        velocity = np.array([vx, vy])
+        ahead = min(max(now - stamp, 0.0), 0.02)
+        paddle = np.array([x, y]) + ahead * velocity
+        self.world.step(paddle, velocity, z)
+        self._now, self._arm_then = now, [*paddle.tolist(), z, vx, vy]
+        self._steps += 1
+        if self._steps % self._every == 0 and not self._frozen:
+            self._server.send(self._photograph(now, paddle, velocity))
+
+    def _photograph(self, now: float, paddle: Any, velocity: Any) -> Frame:
+        world = self.world
+        moving = np.zeros(2) if world.held else world.puck_velocity
+        puck = world.puck if world.present else None
+        seen = Seen(puck, moving, paddle, velocity)
+        self._frames += 1
+        image = self._camera.photograph(seen, self._frames)
+        return Frame(image, now, self._frames)
+
+    def obey(self, order: dict[str, Any]) -> dict[str, Any]:
+        """Do what the lab's operator asks for; return what there is to tell."""
+        world = self.world
+        what = order["do"]
+        if what == "place":
+            place, velocity = np.array(order["puck"]), np.array(order["velocity"])
+            world.put(place, velocity, held=True)
+        elif what == "release":
+            world.release()
+        elif what == "board":
+            self._camera.show_board(order["number"])
+        elif what == "fault":
+            self.faults[order["name"]](bool(order["on"]))
+        since = self._now - world.time
+        return {
+            "time": self._now,
+            "touches": [since + t for t in world.touches],
+            "banks": [(since + t, s) for t, s in world.banks],
+            "paddle": self._arm_then,
+            "puck": world.puck.tolist(),
+            "velocity": world.puck_velocity.tolist(),
+            "laws": {name: float(value[0]) for name, value in world.laws.items()},
+        }
+
+
+def run_table(
+    setup: LabSetup, seed: int, frame_rate: float, memory: Any, pipe: Connection
+) -> None:
+    """Play the table until the other end of the pipe is closed."""
+    server = FrameServer(setup.latency)
+    block = Block(np.frombuffer(memory))
+    loop = TableLoop(setup, seed, frame_rate, block, server)
+    loop.step(time.monotonic())
+    pipe.send({"port": server.port})
+    due = time.monotonic()
+    while True:
+        try:
+            while pipe.poll():
+                pipe.send(loop.obey(pipe.recv()))
+        except (EOFError, OSError):
+            return
+        loop.step(due)
+        due += 1.0 / RATE
+        left = due - time.monotonic()
+        if left > 0:
+            time.sleep(left)
+        elif left < -LATE:
+            due = time.monotonic()

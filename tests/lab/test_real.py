@@ -1,0 +1,118 @@
+"""Backend real against the lab: camera and robot make the state."""
+
+import copy
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+import marl_airhockey as ah
+from marl_airhockey.core.errors import UnknownKeywordError
+from marl_airhockey.devices.rig import Rig
+from marl_airhockey.evaluation.evaluate import build_driven_world, evaluate
+from marl_airhockey.registry import find_backend, make_agent
+
+
+def keywords(rig, **options):
+    return {
+        "backend": "real",
+        "rig": str(rig),
+        "profile": "ur5e",
+        "options": {"table": "full_size", **options},
+    }
+
+
+def test_a_policy_reaches_through_camera_and_robot(rig):
+    driver = make_agent("zoo/reach_full_size")
+    result = evaluate(driver, "reach", "reach", 2, keywords=keywords(rig))
+    assert result.success == 1.0
+    assert result.interrupted == 0
+
+
+def test_a_puck_is_seen_touched_and_lost_as_it_is(lab, rig):
+    world = build_driven_world(
+        make_agent("zoo/touch_full_size"), "touch", 1, keywords(rig)
+    )
+    try:
+        world.reset(3)
+        off = []
+        for _ in range(60):
+            result = world.step(np.zeros((1, 0, 2)))
+            truth = lab.ask({"do": "truth"})
+            off.append(np.linalg.norm(world.state.puck[0, 0] - truth["puck"]))
+            if result.terminated[0] or result.truncated[0]:
+                break
+        assert np.median(off) < 0.01
+        assert bool(world.memory["touches"].any()) == bool(truth["touches"])
+        with pytest.raises(TypeError, match="real table"):
+            copy.deepcopy(world)
+    finally:
+        world.close()
+
+
+def test_a_reach_beyond_the_joints_is_refused_before_anything_moves(rig, tmp_path):
+    found = Rig.load(rig)
+    fast = dataclasses.replace(found.limits, speed=1.0)
+    path = tmp_path / "fast.json"
+    dataclasses.replace(found, limits=fast).save(path)
+    with pytest.raises(ValueError, match=r"joint \d needs .* for 1.0 m/s"):
+        ah.parallel_env("reach", **keywords(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("protective_stop", "protective stop"),
+        ("silent_robot", "robot silent"),
+        ("frozen_camera", "no frame"),
+        ("lost_puck", "not seen"),
+    ],
+)
+def test_what_fails_ends_the_episode_with_its_reason(lab, rig, fault, name, words):
+    env = ah.parallel_env("juggle", **keywords(rig))
+    try:
+        env.reset(seed=0)
+        fault(name)
+        for _ in range(80):
+            _, _, terminated, truncated, infos = env.step({"paddle_0": np.zeros(2)})
+            if truncated["paddle_0"] or terminated["paddle_0"]:
+                break
+        assert truncated["paddle_0"]
+        assert words in infos["paddle_0"]["interruption"]
+    finally:
+        env.close()
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "words"),
+    [
+        ("duel", {}, "one arm"),
+        ("move_block", {}, "no blocks"),
+        ("strike", {}, "tilted"),
+        ("juggle", {"pucks": 2}, "one puck"),
+    ],
+)
+def test_what_is_not_on_the_table_is_refused_in_words(task, options, words):
+    scene = ah.make_scenario(task, table="full_size", **options).scene
+    assert words in find_backend("real").supports(scene)
+
+
+def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
+    with pytest.raises(ValueError, match="table=full_size"):
+        ah.parallel_env("reach", backend="real", rig=str(rig))
+    with pytest.raises(ValueError, match="--lab"):
+        ah.parallel_env("reach", backend="real")
+    with pytest.raises(ValueError, match="no devices"):
+        ah.parallel_env("reach", rig=str(rig))
+    with pytest.raises(ValueError, match="real arm"):
+        build_driven_world(make_agent("sticky"), "reach", 1, keywords(rig))
+    with pytest.raises(UnknownKeywordError):
+        ah.parallel_env("reach", rigg="x")
+
+
+def test_a_camera_that_was_moved_is_noticed(lab, rig, fault):
+    fault("moved_camera")
+    time.sleep(1.0)
+    with pytest.raises(RuntimeError, match="calibrate anew"):
+        ah.parallel_env("reach", **keywords(rig))
