@@ -13,10 +13,9 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm
-from marl_airhockey.registry import DEFAULT_BACKEND
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world, scenario_of
-from marl_airhockey.world.step_result import StepResult
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000
@@ -48,6 +47,8 @@ class EvaluationResult:
     hits: float
     """Mean number of distinct touches in an episode"""
     deployability: Deployability
+    interrupted: int = 0
+    """Number of episodes that a real table had to end; they are no success"""
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object, `returns` under the key "return"."""
@@ -96,6 +97,8 @@ def evaluate(
 ) -> EvaluationResult:
     """Let a driver play some episodes at ``paddle_0``, all at once, and measure it.
 
+    On a real table they follow each other.
+
     Args:
         driver: driver that plays.
         name: name of the driver in the result.
@@ -111,14 +114,19 @@ def evaluate(
     keywords = keywords if keywords is not None else {}
     if episodes < 1:
         raise ValueError(f"episodes: {episodes} must be at least 1")
-    world = build_driven_world(driver, scenario, episodes, keywords)
-    world.reset(seed)
-    statistics = _EpisodeStatistics(world)
-    no_actions = np.zeros((episodes, 0, 2))
-    while not statistics.done.all():
-        statistics.add(world.step(no_actions))
+    name_of_backend = keywords.get("backend", DEFAULT_BACKEND)
+    # On a real table episodes follow each other; elsewhere all are played at once.
+    at_once = 1 if find_backend(name_of_backend).realtime else episodes
+    world = build_driven_world(driver, scenario, at_once, keywords)
+    statistics = EpisodeStatistics(episodes)
+    try:
+        for first in range(0, episodes, at_once):
+            statistics.play(world, seed + first, slice(first, first + at_once))
+        deployability = statistics.deployability(world)
+    finally:
+        world.close()
     success = float(statistics.success.mean())
-    result = EvaluationResult(
+    return EvaluationResult(
         driver=name,
         scenario=world.scenario.name,
         backend=keywords.get("backend", DEFAULT_BACKEND),
@@ -132,62 +140,72 @@ def evaluate(
         returns_interval=bootstrap(statistics.returns, iqm),
         length=float(statistics.length.mean()),
         hits=float(statistics.hits.mean()),
-        deployability=statistics.deployability(),
+        deployability=deployability,
+        interrupted=len(statistics.interruptions),
     )
-    world.close()
-    return result
 
 
-class _EpisodeStatistics:
-    """Statistics of the first episode of every world, and of ``paddle_0`` in it.
+class EpisodeStatistics:
+    """Statistics of episodes, and of ``paddle_0`` in them.
 
     Args:
-        world: the worlds, reset.
+        episodes: number of them.
     """
 
-    def __init__(self, world: World) -> None:
-        self.world, b = world, world.num_worlds
-        self.done = np.zeros(b, np.bool_)
-        """(B,) True for worlds whose first episode is over"""
-        self.success, self.first_shot = np.zeros((2, b), np.bool_)
-        self.returns, self.length, self.hits = np.zeros((3, b))
+    def __init__(self, episodes: int) -> None:
+        self.success, self.first_shot = np.zeros((2, episodes), np.bool_)
+        self.returns, self.length, self.hits = np.zeros((3, episodes))
+        self.interruptions: list[str] = []
+        """Reasons of the episodes that a real table had to end."""
         self._violations = 0
         self._jerks: list[Array] = []
         self._actions: list[Array] = []
-        self._acceleration = np.zeros((b, 2))
-        self._command = np.zeros((b, 2))
+        """Actions (steps, 2) of each episode, nan after its end"""
 
-    def add(self, result: StepResult) -> None:
-        """Add the step that was just made."""
-        world, live = self.world, ~self.done
-        dt = world.control_dt
-        self.length += live
-        self._violations += int(((result.violation[:, 0, -1] > 0) & live).sum())
-        command = world.command[:, 0]
-        acceleration = (command - self._command) / dt
-        self._jerks.append(((acceleration - self._acceleration)[live] / dt).ravel())
-        self._acceleration, self._command = acceleration, command
-        self._actions.append(np.where(live[:, None], world.action[:, 0], np.nan))
-        ended = (result.terminated | result.truncated) & live
+    def play(self, world: World, seed: int, rows: slice) -> None:
+        """Play an episode in each of B worlds, and keep it in B rows."""
+        world.reset(seed)
+        b, dt = world.num_worlds, world.control_dt
+        done, no_actions = np.zeros(b, np.bool_), np.zeros((b, 0, 2))
+        last, last_command = np.zeros((2, b, 2))
+        actions: list[Array] = []
+        while not done.all():
+            result, live = world.step(no_actions), ~done
+            self.length[rows] += live
+            self._violations += int(((result.violation[:, 0, -1] > 0) & live).sum())
+            command = world.command[:, 0]
+            acceleration = (command - last_command) / dt
+            self._jerks.append(((acceleration - last)[live] / dt).ravel())
+            last, last_command = acceleration, command
+            actions.append(np.where(live[:, None], world.action[:, 0], np.nan))
+            ended = (result.terminated | result.truncated) & live
+            self._end(world, ended, rows)
+            if result.interruption:
+                self.interruptions.append(result.interruption)
+            done |= ended
+        self._actions += list(np.stack(actions, 1))
+
+    def _end(self, world: World, ended: Array, rows: slice) -> None:
+        """Keep what the episodes that ended have come to."""
         episode = world.episode
         if np.isnan(episode.returns).any():
             bad = [name for name, term in world.terms.items() if np.isnan(term).any()]
             raise ValueError(f"{world.scenario.name}: reward terms {bad} are nan")
-        self.success[ended] = episode.success[ended, 0]
-        self.first_shot[ended] = episode.first_shot[ended]
-        self.returns[ended] = episode.returns[ended, 0]
+        self.success[rows][ended] = episode.success[ended, 0]
+        self.first_shot[rows][ended] = episode.first_shot[ended]
+        self.returns[rows][ended] = episode.returns[ended, 0]
         if "touches" in world.memory:
-            self.hits[ended] = world.memory["touches"].sum((-1, -2))[ended]
-        self.done |= ended
+            self.hits[rows][ended] = world.memory["touches"].sum((-1, -2))[ended]
 
-    def deployability(self) -> Deployability:
+    def deployability(self, world: World) -> Deployability:
         """Return the driver's fitness for a real arm."""
+        dt = world.control_dt
         return Deployability.of(
             self._violations / max(self.length.sum(), 1),
             self._rms_jerk(),
-            self._power_above(5.0),
-            _act_ms(self.world),
-            self.world.control_dt,
+            self._power_above(5.0, dt),
+            _act_ms(world),
+            dt,
         )
 
     def _rms_jerk(self) -> float:
@@ -195,16 +213,15 @@ class _EpisodeStatistics:
         jerks = np.concatenate(self._jerks)
         return float(np.sqrt((jerks**2).mean()))
 
-    def _power_above(self, frequency: float) -> float:
+    def _power_above(self, frequency: float, dt: float) -> float:
         """Return the share of the actions' power above a frequency, Hz.
 
         It is nan if the frequency is not below half of the control rate.
         """
-        dt = self.world.control_dt
         if 0.5 / dt <= frequency:
             return float("nan")
         high = total = 0.0
-        for action in np.stack(self._actions, 1):
+        for action in self._actions:
             series = action[np.isfinite(action[:, 0])]
             if len(series) < 8:
                 continue
@@ -232,7 +249,7 @@ def _act_ms(world: World) -> float:
     memory = seat.driver.reset(world.scene.seats[0], single.rng, 1)
     times = []
     for _ in range(50):
-        began = time.process_time()
+        began = time.thread_time()
         seat.driver.act(single, memory)
-        times.append(time.process_time() - began)
+        times.append(time.thread_time() - began)
     return float(np.median(times) * 1000)

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.evaluation.recordings import head
+from marl_airhockey.core.recording import SUFFIX, read_head
 from marl_airhockey.study.plan import Plan
 
 FORMAT = 1
@@ -27,7 +27,7 @@ REPORTS = (
     *(f"report.{kind}" for kind in ("json", "md", "png")),
     *("games.csv", "answers.csv", "answers.md", "answers.png"),
 )
-"""Files that `airhockey record report` writes."""
+"""Files that `airhockey data report` writes."""
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 """Characters of codes; none that is mistaken for another."""
 
@@ -175,8 +175,8 @@ def erase(folder: Path, code: str) -> int:
             number = diary.number
             gone += sum(p.is_file() for p in diary.folder.rglob("*"))
             shutil.rmtree(diary.folder)
-    for path in list(folder.rglob("*.jsonl")):
-        if code in [player["person"] for player in head(path).get("players", [])]:
+    for path in list(folder.rglob(f"*{SUFFIX}")):
+        if code in [player["person"] for player in read_head(path).get("players", [])]:
             path.unlink()
             gone += 1
     if not gone:

@@ -7,7 +7,7 @@ import pytest
 from pages import aim, line
 from study_steps import PLAN, answer, consent, enter, plan_writer, play, stage
 
-from marl_airhockey.evaluation.recordings import head
+from marl_airhockey.core.recording import read_head
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.report import summarize
 from marl_airhockey.play.session import GONE, GRACE, IDLE
@@ -30,7 +30,9 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     assert client.seat is None
     study.receive(client, line("start"))
     assert study.match.phase == "lobby"
-    assert not list(out.rglob("*.jsonl")), "nothing is kept before the consent"
+    assert not [*out.rglob("*.jsonl"), *out.rglob("*.rec")], (
+        "nothing is kept before the consent"
+    )
     with pytest.raises(ValueError, match="load the page again"):
         study.receive(client, line("consent", version="2"))
     consent(study, client)
@@ -67,7 +69,7 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
         *("game", "answer", "answer", "end"),
     ]
     assert found.rows[1]["version"] == "3"
-    metas = [head(path) for path in sorted(found.folder.glob("*duel.jsonl"))]
+    metas = [read_head(path) for path in sorted(found.folder.glob("*duel.rec"))]
     assert [meta["study"]["practice"] for meta in metas] == [True, False, False]
     assert metas[1]["players"][0]["person"] == code
     assert metas[1]["players"][0]["consent"] == "3"
@@ -96,10 +98,10 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     study.receive(first, line("start"))
     for _ in range(round(3.5 * RATE)):
         study.tick()
-    assert list(out.rglob("*duel.jsonl"))
+    assert list(out.rglob("*duel.rec"))
     study.receive(first, line("withdraw"))
     assert stage(study, first) == {"stage": "erased"}
-    assert not list(out.rglob("*duel.jsonl"))
+    assert not list(out.rglob("*duel.rec"))
     (line_left,) = (out / "erased.jsonl").read_text().splitlines()
     assert json.loads(line_left).keys() == {"at", "number", "files"}
     second = enter(study, "b")
@@ -131,8 +133,8 @@ def test_people_play_each_other_and_either_can_withdraw(plan, tmp_path):
     play(study, subject)
     assert stage(study, subject)["stage"] == "questions"
     answer(study, subject)
-    games = [p for p in out.rglob("*duel.jsonl") if not head(p)["study"]["practice"]]
-    assert [row["consent"] for row in head(games[0])["players"]] == ["3", "3"]
+    games = [p for p in out.rglob("*duel.rec") if not read_head(p)["study"]["practice"]]
+    assert [row["consent"] for row in read_head(games[0])["players"]] == ["3", "3"]
     study.receive(partner, line("withdraw"))
     assert not games[0].exists()
     assert stage(study, subject)["stage"] == "end"

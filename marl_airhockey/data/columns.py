@@ -1,0 +1,170 @@
+"""Columns of a recording: what is kept of worlds, and states made of it again."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import platform
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.blocks import Columns
+from marl_airhockey.core.recording import RecordedEpisode, Recording
+from marl_airhockey.core.state import RESULTS, State
+from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
+from marl_airhockey.types import Memory
+from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.world import World
+
+STATE, SENSED, MEMORY, TERM = "state.", "sensed.", "memory.", "term."
+"""Beginnings of the names of columns"""
+SEEN = ("position", "velocity", "visible")
+"""Fields of the sensed state that are kept"""
+
+
+def head_of(world: World, keywords: Keywords) -> dict[str, Any]:
+    """Return what holds for all episodes of a recording of a world."""
+    return {
+        "began": datetime.datetime.now(datetime.UTC).isoformat(),
+        "scenario": world.scenario.name,
+        "options": dict(keywords.get("options", {})),
+        "backend": keywords.get("backend", DEFAULT_BACKEND),
+        "profile": keywords.get("profile", "ideal"),
+        "control_dt": world.control_dt,
+        "max_cycles": world.max_cycles,
+        "observe": world.observer.observe,
+        **({"goals": keywords["goals"]} if "goals" in keywords else {}),
+        **_rig(keywords),
+        "versions": {
+            "marl_airhockey": metadata.version("marl_airhockey"),
+            "python": platform.python_version(),
+        },
+    }
+
+
+def _rig(keywords: Keywords) -> dict[str, Any]:
+    """Return the rig of a real table, whole: its file may be another one tomorrow."""
+    path = keywords.get("rig")
+    return {"rig": json.loads(Path(path).read_text())} if path else {}
+
+
+def notes_of(world: World, row: int = 0) -> dict[str, Any]:
+    """Return what holds for the running episode of a world: seed and physics."""
+    episode = world.episode
+    return {
+        "seed": int(world.seeds[row]),
+        "number": int(episode.number[row]),
+        "physics": {k: float(v[row]) for k, v in episode.physics.items()},
+    }
+
+
+def first_columns(world: World) -> Columns:
+    """Return the columns (B, ...) of what is there now: state, memory, observation."""
+    state = world.state
+    columns = {STATE + name: getattr(state, name) for name in RESULTS}
+    if not world.sensor.ideal:
+        sensed = world.sensed
+        columns |= {SENSED + name: getattr(sensed, name) for name in SEEN}
+    columns |= {MEMORY + name: value for name, value in world.memory.items()}
+    if world.observer.observe == "pixels":
+        return columns
+    shown = world.observe(np.arange(len(world.scene.seats)))
+    if isinstance(shown, Mapping):
+        return columns | {f"observation.{k}": v for k, v in shown.items()}
+    return columns | {"observation": shown}
+
+
+def step_columns(world: World) -> Columns:
+    """Return the columns (B, ...) of the step that was made last."""
+    outcome, episode = world.outcome, world.episode
+    return {
+        **first_columns(world),
+        "action": world.asked,
+        "delayed_action": world.action,
+        "command": world.command,
+        **outcome,
+        **{TERM + name: value for name, value in world.terms.items()},
+        "returns": episode.returns,
+        "success": episode.success,
+        **_devices(world),
+    }
+
+
+def _devices(world: World) -> Columns:
+    """Return the numbers that devices of a real table tell, (1, ...) each."""
+    numbers = world.backend.telemetry()
+    return {
+        f"device.{name}": np.array([np.nan if value is None else value], np.float64)
+        for name, value in numbers.items()
+        if not isinstance(value, str)
+    }
+
+
+def scenario_of(recording: Recording) -> Scenario:
+    """Return the scenario that was recorded.
+
+    Raises:
+        ValueError: one that is not installed here, or with other bodies.
+    """
+    head = recording.head
+    try:
+        scenario = make_scenario(head["scenario"], **head.get("options", {}))
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{recording.path}: {error}") from error
+    bodies = len(scenario.scene.bodies)
+    for episode in recording.episodes:
+        found = episode.first.get(STATE + "position", np.zeros((0, 2)))
+        if found.shape != (bodies, 2):
+            raise ValueError(
+                f"{recording.path}: it has {len(found)} bodies and the scenario "
+                f"{scenario.name!r} has {bodies}: it was recorded by another version"
+            )
+    return scenario
+
+
+def states_of(episode: RecordedEpisode, scenario: Scenario) -> State:
+    """Return the states (T + 1, ...) of an episode, that before the first step first.
+
+    Raises:
+        ValueError: a column that is missing or of another shape, named.
+    """
+    rows = len(episode) + 1
+    still = scenario.scene.still_state(rows)
+    fields = {}
+    for name in RESULTS:
+        value = _joined(episode, STATE + name)
+        wanted = getattr(still, name)
+        if value.shape != wanted.shape:
+            raise ValueError(
+                f"{STATE}{name}: shape {value.shape}, expected {wanted.shape}"
+            )
+        fields[name] = value
+    return replace(still, **fields)
+
+
+def memories_of(episode: RecordedEpisode) -> Memory:
+    """Return the scenario's memories (T + 1, ...) of an episode."""
+    names = [n for n in episode.first if n.startswith(MEMORY)]
+    return {n.removeprefix(MEMORY): _joined(episode, n) for n in names}
+
+
+def _joined(episode: RecordedEpisode, name: str) -> Any:
+    """Return a column with its first value before it.
+
+    Raises:
+        ValueError: it is missing.
+    """
+    if name not in episode.first:
+        raise ValueError(f"{name}: it is missing")
+    first = episode.first[name][None]
+    if not len(episode):
+        return first
+    if name not in episode.columns:
+        raise ValueError(f"{name}: it is missing")
+    return np.concatenate([first, episode.columns[name]])

@@ -1,0 +1,202 @@
+"""Extraction: where puck and paddle were, out of a video of a calibrated table."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from marl_airhockey.core.recording import SUFFIX, read_recording
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.devices.camera import FileSource, Frame
+from marl_airhockey.devices.camera.film import read_times
+from marl_airhockey.devices.rig import Rig
+from marl_airhockey.devices.rig_file import rig_fields
+from marl_airhockey.devices.vision import Detector
+from marl_airhockey.devices.vision.calibration import find_tags, moved
+from marl_airhockey.types import Array
+
+MOVED = 2.0
+"""Error of the tags, px, at which the camera is not where it was calibrated"""
+LOOKED = 5
+"""Number of pictures, spread over a video, in which the tags are looked for"""
+SEVERAL = 0.1
+"""Share of pictures with two pucks from which on a video is refused"""
+PADDLE_TOP = 0.06
+"""Height of a paddle's top above the table, m"""
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Trajectories out of one video of N pictures."""
+
+    time: Array
+    """(N,) s; of a recording, since its first episode began, without what lay
+    between episodes"""
+    puck: Array
+    """(N, 2) table frame, m; nan where it was not seen"""
+    paddle: Array
+    """(N, 2) the same of the paddle's middle"""
+    table: str
+    """Name of the table's preset"""
+
+    def gaps(self, of: Array) -> list[tuple[float, float]]:
+        """Return begin and end, s, of the times in which ``of`` was not seen."""
+        unseen = np.isnan(of[:, 0]).astype(np.int8)
+        edges = np.diff(np.concatenate([[0], unseen, [0]]))
+        # The last picture before and the first one after.
+        begins = np.maximum(np.flatnonzero(edges == 1) - 1, 0)
+        ends = np.minimum(np.flatnonzero(edges == -1), len(self.time) - 1)
+        times = zip(self.time[begins].tolist(), self.time[ends].tolist(), strict=True)
+        return list(times)
+
+    def write(self, path: Path) -> None:
+        """Write a CSV with a row a picture; what was not seen is left empty.
+
+        `airhockey fit` reads it.
+        """
+        partial = path.with_suffix(".part")
+        with partial.open("w", newline="") as file:
+            rows = csv.writer(file)
+            rows.writerow(["t", "x", "y", "paddle_x", "paddle_y"])
+            for when, *places in np.column_stack([self.time, self.puck, self.paddle]):
+                cells = ["" if np.isnan(x) else f"{x:.5f}" for x in places]
+                rows.writerow([f"{when:.4f}", *cells])
+        partial.rename(path)
+
+
+def extract(path: Path, rig: Rig | None = None) -> Trajectories:
+    """Return the trajectories out of a video, or out of a recording with one beside it.
+
+    Args:
+        path: of a video, or of a recording.
+        rig: of its table; None for the one that the recording holds.
+
+    Raises:
+        ValueError: no video, one without the table, of a camera that was moved since it
+            was calibrated, or with two pucks.
+    """
+    recorded = path if path.suffix == SUFFIX else path.with_suffix(SUFFIX)
+    times: Array | None = None
+    if recorded.exists():
+        path, own, times = _recorded(recorded)
+        rig = rig or own
+    if rig is None:
+        raise ValueError(
+            f"{path}: which table is this? --rig FILE, or name a recording that has it"
+        )
+    table, view = TABLES[rig.table], rig.view
+    if rig.paddle is None:
+        raise ValueError(
+            "the rig does not know the paddle's colour: calibrate anew, and click it"
+        )
+    half = float(table.size[0]) / 2, float(table.size[1]) / 2
+    puck = Detector(view, rig.puck, table.puck_radius, half, readout=rig.readout)
+    paddle = Detector(view, rig.paddle, table.paddle_radius, half, PADDLE_TOP)
+    _check_view(path, rig)
+    rows: list[tuple[float, Array, Array]] = []
+    several = 0
+    for frame in _pictures(path):
+        pucks, paddles = puck.find_all(frame), paddle.find(frame)
+        several += len(pucks) > 1
+        unseen = np.full(2, np.nan)
+        place = pucks[0].place if len(pucks) == 1 else unseen
+        rows.append((frame.taken, place, paddles.place if paddles else unseen))
+    if several > SEVERAL * len(rows):
+        raise ValueError(
+            f"{path}: {several} of {len(rows)} pictures show two pucks; film one"
+        )
+    taken, places, moving = (np.array(column) for column in zip(*rows, strict=True))
+    if times is not None:
+        # What was cut off may lack its last times, or its last pictures.
+        count = min(len(times), len(taken))
+        taken, places, moving = times[:count], places[:count], moving[:count]
+    shown = np.isfinite(taken)
+    return Trajectories(taken[shown], places[shown], moving[shown], rig.table)
+
+
+def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
+    """Return the video beside a recording, its rig, and when its pictures were taken.
+
+    The times (N,) are those since the first episode began, s; nan for pictures that
+    belong to no episode.
+    """
+    recording = read_recording(path)
+    name = recording.head.get("film")
+    if not name:
+        raise ValueError(f"{path}: it was recorded without a video (teleop --film)")
+    whole = [episode for episode in recording.episodes if len(episode)]
+    if not whole or "device.moment" not in whole[0].columns:
+        raise ValueError(f"{path}: no step of it has a picture")
+    video = path.with_name(Path(str(name)).name)
+    taken = read_times(video)
+    played = np.zeros(len(taken), np.bool_)
+    for episode in whole:
+        moments = episode.columns["device.moment"]
+        played |= (taken >= moments[0]) & (taken <= moments[-1])
+    first = whole[0].columns
+    began = first["device.moment"][0] - first["state.time"][0]
+    times = np.where(played, taken - began, np.nan)
+    given = recording.head.get("rig")
+    rig = None
+    if given is not None:
+        rig = Rig.from_fields(path, rig_fields(path, given, "table"))
+    return video, rig, times
+
+
+def _pictures(path: Path) -> Iterator[Frame]:
+    """Give the pictures of a video, the time in s from its first one."""
+    source = FileSource(path, realtime=False)
+    source.open()
+    try:
+        while (frame := source.read()) is not None:
+            yield Frame(frame.image, frame.number / source.rate, frame.number)
+    finally:
+        source.close()
+
+
+def _check_view(path: Path, rig: Rig) -> None:
+    """Refuse a video that does not show the table as the rig's camera does."""
+    pictures = [frame.image for frame in _spread(path)]
+    if not pictures:
+        raise ValueError(f"{path}: there is no picture in it")
+    height, width = pictures[0].shape[:2]
+    if (width, height) != tuple(rig.view.lens.size):
+        raise ValueError(
+            f"{path}: its pictures are {width} x {height}, those of the calibrated "
+            f"camera {rig.view.lens.size[0]} x {rig.view.lens.size[1]}"
+        )
+    known = rig.known_tags
+    if not known:
+        return
+    off = [moved(rig.view, find_tags(image), known) for image in pictures]
+    seen = [error for error in off if np.isfinite(error)]
+    if not seen:
+        raise ValueError(
+            f"{path}: none of the table's tags is seen; is this a video of the table?"
+        )
+    if float(np.median(seen)) > MOVED:
+        raise ValueError(
+            f"{path}: the tags are {np.median(seen):.1f} px from where they were; the "
+            "camera was moved after it was calibrated"
+        )
+
+
+def _spread(path: Path) -> list[Frame]:
+    """Return some pictures from all over a video."""
+    capture = cv2.VideoCapture(str(path))
+    count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
+    capture.release()
+    # A film that was cut off does not tell how long it is.
+    every = max(count // LOOKED, 1) if count > 0 else 15
+    found: list[Frame] = []
+    for frame in _pictures(path):
+        if frame.number % every == 0:
+            found.append(frame)
+        if len(found) == LOOKED:
+            break
+    return found

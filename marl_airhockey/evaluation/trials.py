@@ -1,0 +1,171 @@
+"""Trials: policies compared on one table, from the same starts and in turns.
+
+What changes in the course of a day (a table that warms up, an operator who gets better)
+meets all of them alike, and who puts the puck on the table is not told who will play.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.core.state import State
+from marl_airhockey.evaluation.evaluate import TEST_SEED, EpisodeStatistics
+from marl_airhockey.evaluation.trial_sheet import TrialRow, TrialSheet
+from marl_airhockey.types import Array, Memory
+from marl_airhockey.world.driven_seat import DrivenSeat
+from marl_airhockey.world.world import World
+
+DRAWS = 20
+"""Starts that are drawn for each one that is taken"""
+FAR = 1e3
+"""Number above which a memory tells of nothing on the table"""
+ROUNDS = 12
+"""Rounds in which the taken ones are spread"""
+
+
+def play_trials(
+    world: World,
+    sheet: TrialSheet,
+    drivers: dict[str, list[Driver]],
+    done: Callable[[int], None] = lambda trials: None,
+) -> None:
+    """Play the trials of a sheet that have no row yet, and write their rows.
+
+    Args:
+        world: one, on the table of the plan, before its first episode; any driver has
+            `paddle_0`.
+        sheet: of the plan.
+        drivers: of `paddle_0`, by the plan's methods and policies.
+        done: called with the number of trials that are done.
+
+    Raises:
+        ValueError: a driver that cannot play in this world.
+    """
+    plan, own = sheet.plan, world.driven[0]
+    with ExitStack() as stack:
+        stack.callback(world.driven.__setitem__, 0, own)
+        # All sit down before the first episode: what they see is kept from then.
+        seats = {
+            (name, k): _seat(world, driver, stack)
+            for name, policies in drivers.items()
+            for k, driver in enumerate(policies)
+        }
+        for trial, (start, name, k) in enumerate(plan.trials):
+            done(trial)
+            if trial < len(sheet.rows):
+                continue
+            world.driven[0] = seats[name, k]
+            found, began = EpisodeStatistics(1), datetime.now(UTC)
+            found.play(world, plan.starts[start], slice(0, 1))
+            sheet.add(
+                TrialRow(
+                    trial=trial,
+                    start=start,
+                    code=plan.codes[name],
+                    policy=k,
+                    success=int(found.success[0] and not found.interruptions),
+                    returns=float(found.returns[0]),
+                    seconds=float(found.length[0] * world.control_dt),
+                    touches=float(found.hits[0]),
+                    began=began.isoformat(timespec="milliseconds"),
+                    ended=datetime.now(UTC).isoformat(timespec="milliseconds"),
+                    reason="; ".join(found.interruptions),
+                )
+            )
+        done(len(plan.trials))
+
+
+def _seat(world: World, driver: Driver, stack: ExitStack) -> DrivenSeat:
+    """Let a driver sit down at paddle_0, until a stack is left."""
+    seat = DrivenSeat(0, driver, world.observer, 1, world.control_dt)
+    stack.push(driver.__exit__)
+    return seat
+
+
+def spread_starts(world: World, count: int) -> list[int]:
+    """Return seeds of starts that are spread over all that a scenario draws.
+
+    They are spread over places, velocities and goals, each by its standard deviation.
+
+    Args:
+        world: one; it is left at some start.
+        count: how many.
+    """
+    seeds = TEST_SEED + np.arange(DRAWS * count)
+    starts = np.stack([_start(world, int(seed)) for seed in seeds])
+    deviation = starts.std(0)
+    drawn = deviation > 1e-9
+    chosen = spread(starts[:, drawn] / deviation[drawn], count)
+    return [int(seed) for seed in seeds[chosen]]
+
+
+def spread(points: Array, count: int) -> Array:
+    """Return indices of points (n, m) that are spread over all, each point once.
+
+    They are those nearest to the means of Lloyd's algorithm (1982).
+    """
+    nearest = np.arange(count)
+    for _ in range(ROUNDS):
+        means = points[nearest]
+        closest = _distances(points, means).argmin(1)
+        # Points that are all alike are nearest to the first mean; others have none.
+        means = np.stack(
+            [
+                points[closest == k].mean(0) if k in closest else means[k]
+                for k in range(count)
+            ]
+        )
+        nearest = _nearest(points, means)
+    return nearest
+
+
+def write_starts(world: World, seeds: list[int], path: Path) -> None:
+    """Write where puck and paddle are at some starts, for marks on the table (CSV)."""
+    bodies = [f"paddle_{i}" for i in range(len(world.scene.seats))]
+    bodies += [f"puck_{i}" for i in range(world.scene.pucks)]
+    columns = [f"{body}_{axis}_m" for body in bodies for axis in "xy"]
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(["start", "seed", *columns])
+        for k, seed in enumerate(seeds):
+            state, _ = _drawn(world, seed)
+            places = np.concatenate([state.paddle[0], state.puck[0]]).ravel()
+            rows.writerow([k, seed, *(f"{x:.3f}" for x in places)])
+
+
+def _drawn(world: World, seed: int) -> tuple[State, Memory]:
+    """Return the state and the memory of the start that a seed draws."""
+    world.seed(seed)
+    world.draw_worlds(np.array([0]))
+    return world.get_state()
+
+
+def _start(world: World, seed: int) -> Array:
+    """Return the numbers of the start that a seed draws."""
+    state, memory = _drawn(world, seed)
+    drawn = [value for value in memory.values() if value.dtype.kind == "f"]
+    parts = [state.position, state.velocity, *drawn]
+    row = np.concatenate([part[0].ravel() for part in parts])
+    # Moments that have not come yet are far away, or nan.
+    return np.where(np.abs(row) < FAR, row, 0.0)
+
+
+def _distances(points: Array, means: Array) -> Array:
+    return np.asarray(np.square(points[:, None] - means).sum(-1))
+
+
+def _nearest(points: Array, means: Array) -> Array:
+    """Return the index of the point nearest to each mean, each point once."""
+    distances = _distances(points, means)
+    found: list[int] = []
+    for k in range(len(means)):
+        distances[found, k] = np.inf
+        found.append(int(distances[:, k].argmin()))
+    return np.array(found)
