@@ -4,56 +4,47 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.profiles import PROFILES
-from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, runs_code
-from marl_airhockey.toolkit.policies import RUN_FORMAT, check_run_format
+from marl_airhockey.core.profiles import SUFFIX, find_profile
+from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.registry import find_scenario, runs_code
+from marl_airhockey.toolkit.policies import check_run_format
 from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.world.build import Keywords
 
 OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
 RIVALS = ("random", "goalkeeper", "striker", "allround")
-MAY_BE_ZERO = (
-    "seed",
-    "num_env_runners",
-    "ent_coef",
-    "log_std_init",
-    "mirror",
-    "script_share",
-)
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainConfig:
+class TrainConfig(RunConfig):
     """Settings of a PPO run; the fields are the options of ``--set``.
+
+    Its ``total_steps`` are of single worlds, summed over all worlds.
 
     Raises:
         ValueError: a value that makes no sense, named.
     """
 
-    scenario: str
-    seed: int = 0
-    backend: str = DEFAULT_BACKEND
-    profile: str = "ideal"
-    observe: str = "velocity"
-    options: dict[str, Any] = field(default_factory=dict)
-    """Values of the scenario's own fields, by name"""
+    MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
+        "seed",
+        "num_env_runners",
+        "ent_coef",
+        "log_std_init",
+        "mirror",
+        "script_share",
+    )
     training_options: dict[str, Any] = field(default_factory=dict)
-    """The same for training alone, not for evaluations; `options` comes first"""
-    drivers: dict[str, str] = field(default_factory=dict)
-    """Drivers of seats that are not learned, by agent"""
-    physics: dict[str, Any] = field(default_factory=dict)
-    """Physical parameters, by name: numbers or ranges"""
+    """Like `options`, for training alone and not for evaluations; `options` comes
+    first"""
     training_physics: dict[str, Any] = field(default_factory=dict)
-    """The same for training alone, not for evaluations; `physics` comes first"""
-    control_dt: float = 0.05
-    """s between two actions; `gamma` is of one of them"""
+    """The same for `physics`"""
     engine: str = "torch"
     """"torch" or "sb3" in this process, or "rllib" over many."""
     num_env_runners: int = 0
@@ -62,31 +53,19 @@ class TrainConfig:
     init: str = ""
     """Folder of a run of the same engine and network size, to begin with its weights"""
 
-    total_steps: int
-    """Steps of single worlds, summed over all worlds"""
     num_worlds: int
     n_steps: int
     """Steps of each world in a rollout"""
-    batch_size: int
     n_epochs: int
-    learning_rate: float
     highest_rate: float
     """Highest learning rate, to which a low KL divergence raises it"""
     target_kl: float
     """KL divergence; the rate is lowered above twice it, raised below half of it"""
-    gamma: float
     gae_lambda: float
     clip_range: float
     ent_coef: float
     max_grad_norm: float
     log_std_init: float
-    hidden: list[int]
-    """Widths of the hidden layers; actor and critic share none"""
-    evaluations: int
-    """Number of evaluations during training"""
-    eval_episodes: int
-    torch_threads: int = 1
-
     mirror: float = 0.5
     """Share of the worlds of a game in which the learner plays all seats"""
     opponents: list[str] = field(default_factory=lambda: list(OPPONENTS))
@@ -106,18 +85,7 @@ class TrainConfig:
     """Drivers that evaluations of games are against"""
 
     def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            if f.type in ("int", "float") and not number:
-                raise ValueError(f"{f.name}: expected a number, got {value!r}")
-            if f.type == "int" and int(value) != value:
-                raise ValueError(f"{f.name}: expected a whole number, got {value!r}")
-            if number and f.name not in MAY_BE_ZERO and value <= 0:
-                raise ValueError(f"{f.name}: {value} must be above 0")
-        if not self.hidden or any(w < 1 for w in self.hidden):
-            raise ValueError(f"hidden: {self.hidden} must be widths above 0")
-
+        super().__post_init__()
         if self.drivers and self.self_play:
             raise ValueError(
                 f"drivers: self-play needs all seats of {self.scenario!r} open; to "
@@ -178,43 +146,11 @@ class TrainConfig:
         return self.n_steps * self.slots
 
     @property
-    def keywords(self) -> Keywords:
-        """Keywords of the environments of evaluations."""
-        return {
-            "backend": self.backend,
-            "profile": self.profile,
-            "observe": self.observe,
-            "options": self.options,
-            "drivers": self.drivers,
-            "physics": self.physics,
-            "control_dt": self.control_dt,
-        }
-
-    @property
     def training_keywords(self) -> Keywords:
         """Keywords of the environments of training."""
         physics = {**self.training_physics, **self.physics}
         options = {**self.training_options, **self.options}
         return {**self.keywords, "physics": physics, "options": options}
-
-    def to_toml(self) -> str:
-        """Return the configuration as TOML, readable by `load_config`."""
-        lines, tables = [f"format = {RUN_FORMAT}"], []
-        for name, value in asdict(self).items():
-            if isinstance(value, dict):
-                tables.append(f"\n[{name}]")
-                tables += [f"{k} = {_toml(v)}" for k, v in value.items()]
-            else:
-                lines.append(f"{name} = {_toml(value)}")
-        return "\n".join([*lines, *tables]) + "\n"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    return str(value)
 
 
 def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConfig:
@@ -247,6 +183,9 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     merged = {**presets["defaults"], **presets.get(game.name, {})}
     sensed = merged.pop("sensed", {})
     profile = (changes or {}).get("profile", "ideal")
+    if profile.endswith(SUFFIX):
+        profile = str(Path(profile).expanduser().resolve())
+        changes = {**(changes or {}), "profile": profile}
     if profile != "ideal":
         lags = _lags(profile)
         merged |= {"observe": "estimate", "training_physics": lags, **sensed}
@@ -262,9 +201,7 @@ def _lags(profile: str) -> dict[str, Any]:
 
     So a policy plays on arms that lag less as well, the simulated one among them.
     """
-    if profile not in PROFILES:
-        raise ValueError(unknown_name("profile", profile, PROFILES))
-    return {"servo_time": [0.0, PROFILES[profile].ranges["servo_time"][1]]}
+    return {"servo_time": [0.0, find_profile(profile).ranges["servo_time"][1]]}
 
 
 def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
@@ -276,8 +213,8 @@ def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
         require_trust(path, code=f"the name of Python code, {found[0]}")
 
 
-def load_config(path: Path) -> TrainConfig:
-    """Read what `TrainConfig.to_toml` wrote.
+def read_settings(path: Path) -> dict[str, Any]:
+    """Return the settings in the ``config.toml`` of a run.
 
     Raises:
         ValueError: not such a file, one of a run of another format, or one that names
@@ -285,10 +222,25 @@ def load_config(path: Path) -> TrainConfig:
     """
     try:
         data = tomllib.loads(path.read_text())
-        found = data.pop("format", 1)
-        if "scenario" in data:
-            check_run_format(path.parent, found)
-        _refuse_code(path, data)
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path} is no training configuration: {error}") from error
+    found = data.pop("format", 1)
+    if "scenario" in data:
+        check_run_format(path.parent, found)
+    _refuse_code(path, data)
+    return data
+
+
+def load_config(path: Path) -> TrainConfig:
+    """Read what `RunConfig.to_toml` wrote of a run of PPO.
+
+    Raises:
+        ValueError: see `read_settings`, or a run of another algorithm.
+    """
+    data = read_settings(path)
+    if "algo" in data:
+        raise ValueError(f"{path.parent}: a run of {data['algo']}, not of PPO")
+    try:
         return TrainConfig(**data)
-    except (OSError, TypeError, tomllib.TOMLDecodeError) as error:
+    except TypeError as error:
         raise ValueError(f"{path} is no training configuration: {error}") from error

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import torch
 from stable_baselines3.common.logger import (
@@ -15,9 +16,13 @@ from stable_baselines3.common.logger import (
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.grade import Metrics, grade
 from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.self_play import SelfPlayVecEnv
 from marl_airhockey.registry import find_backend
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.policies import policy_driver
 from marl_airhockey.world.build import compile_world
 
 
@@ -62,7 +67,7 @@ def training_threads(count: int) -> Iterator[None]:
         torch.set_flush_denormal(False)
 
 
-def start_clock(run: TrainingRun) -> None:
+def start_clock(run: TrainingRun[TrainConfig]) -> None:
     """Count the time of training from now on, after what is compiled once.
 
     Arms are slow to build and compile next to nothing, so they are left alone.
@@ -86,3 +91,48 @@ def note_step(logger: Logger, env: AirHockeyVecEnv) -> None:
     if isinstance(env, SelfPlayVecEnv):
         for name, value in env.scores.items():
             logger.record(f"score/{name}", value)
+
+
+def evaluate_policy(
+    run: TrainingRun[RunConfig],
+    policy: NumpyPolicy,
+    logger: Logger,
+    save: Callable[[str], None],
+) -> Metrics:
+    """Evaluate a policy in training and keep it; return the evaluation's row.
+
+    Args:
+        run: whose folder is kept up to date.
+        policy: as it is now.
+        logger: of the run.
+        save: writes it under a name, "best" or "last".
+    """
+    metrics = grade(lambda mean: policy_driver(policy, "training", mean), run.config)
+    for name, value in metrics.items():
+        logger.record(f"eval/{name}", value)
+    return run.record_evaluation(metrics, save)
+
+
+def save_weights(
+    folder: Path,
+    name: str,
+    model: torch.nn.Module,
+    optimizer: torch.optim.Optimizer,
+    policy: NumpyPolicy,
+) -> None:
+    """Write a policy, and under "last" all that a run goes on from.
+
+    Args:
+        folder: of the run.
+        name: "best" or "last".
+        model: whose weights are kept.
+        optimizer: of the model.
+        policy: the model's, as it is now.
+    """
+    draft = folder / f"part-{name}.pt"
+    state: dict[str, Any] = {"model": model.state_dict()}
+    if name == "last":
+        state["optimizer"] = optimizer.state_dict()
+    torch.save(state, draft)
+    draft.replace(folder / f"{name}.pt")
+    policy.save(folder / f"{name}.npz")

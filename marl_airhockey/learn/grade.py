@@ -8,6 +8,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.registry import make_agent
 from marl_airhockey.world.build import Keywords
 
@@ -19,12 +20,14 @@ DriverFactory = Callable[[bool], Driver]
 """Maker of the policy as a driver that acts by its mean (True) or samples (False)"""
 
 
-def grade(make: DriverFactory, config: TrainConfig) -> Metrics:
+def grade(make: DriverFactory, config: RunConfig) -> Metrics:
     """Evaluate a policy in training on the evaluation seeds."""
-    return _scores(make, config) if config.self_play else _success(make, config)
+    if isinstance(config, TrainConfig) and config.self_play:
+        return _scores(make, config)
+    return _success(make, config)
 
 
-def _success(make: DriverFactory, config: TrainConfig) -> Metrics:
+def _success(make: DriverFactory, config: RunConfig) -> Metrics:
     mean, sampled = (
         evaluate(
             make(deterministic),

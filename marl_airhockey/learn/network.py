@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,9 @@ from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
-from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import RUN_FORMAT, numpy_actor
+from marl_airhockey.toolkit.policies import RUN_FORMAT, numpy_actor, scaled_policy
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -50,13 +49,18 @@ class FixedScale(BaseFeaturesExtractor):
         return torch.cat([flat, *goals], dim=-1)
 
 
-def policy_card(config: TrainConfig, env: AirHockeyVecEnv) -> dict[str, Any]:
-    """Return what a policy must be given to see; saved together with it."""
+def policy_card(config: RunConfig, labels: Sequence[str]) -> dict[str, Any]:
+    """Return what a policy must be given to see; saved together with it.
+
+    Args:
+        config: of its run.
+        labels: names of the elements of its observations.
+    """
     return {
         "run_format": RUN_FORMAT,
         "scenario": config.scenario,
         "observe": config.observe,
-        "labels": list(env.world.observer.layout.labels),
+        "labels": list(labels),
     }
 
 
@@ -81,7 +85,7 @@ def layers_to_numpy(
         return tensor.detach().cpu().numpy().astype(np.float32).copy()
 
     linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
-    return NumpyPolicy(
+    return scaled_policy(
         [(array(x.weight), array(x.bias)) for x in linear],
         array(scale.centre),
         array(1.0 / scale.rate),

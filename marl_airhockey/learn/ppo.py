@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +19,19 @@ from torch import Tensor, nn
 from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
+    evaluate_policy,
     make_logger,
     note_step,
+    save_weights,
     start_clock,
     training_threads,
 )
-from marl_airhockey.learn.grade import Metrics, grade
+from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.layers import linear_layers, plain_policy
 from marl_airhockey.learn.network import policy_card
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import policy_driver
 
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
@@ -54,8 +55,8 @@ class ActorCritic(nn.Module):
         self.register_buffer("centre", torch.as_tensor(centre))
         self.register_buffer("unit", torch.as_tensor(unit))
         widths = [len(centre), *config.hidden]
-        self.actor = _layers([*widths, 2], 0.01)
-        self.critic = _layers([*widths, 1], 1.0)
+        self.actor = linear_layers([*widths, 2], 0.01)
+        self.critic = linear_layers([*widths, 1], 1.0)
         self.log_std = nn.Parameter(torch.full((2,), config.log_std_init))
 
     def scaled(self, observation: Tensor) -> Tensor:
@@ -69,31 +70,8 @@ class ActorCritic(nn.Module):
 
     def to_numpy(self, card: Mapping[str, Any]) -> NumpyPolicy:
         """Return the actor as plain arrays."""
-        linear = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
-        arrays = [[_array(x.weight), _array(x.bias)] for x in linear]
-        scale = _array(self.centre), _array(self.unit), _array(self.log_std)
-        return NumpyPolicy([(w, b) for w, b in arrays], *scale, card)
-
-
-def _layers(widths: list[int], gain: float) -> nn.Sequential:
-    """Return linear layers with rectifiers between them, orthogonal at first.
-
-    Args:
-        widths: of the input and of the layers.
-        gain: of the last layer; that of the others suits rectifiers.
-    """
-    parts: list[nn.Module] = []
-    last = len(widths) - 2
-    for k, (size, wide) in enumerate(pairwise(widths)):
-        layer = nn.Linear(size, wide)
-        nn.init.orthogonal_(layer.weight, gain if k == last else 2**0.5)
-        nn.init.zeros_(layer.bias)
-        parts += [layer, nn.ReLU(inplace=True)]
-    return nn.Sequential(*parts[:-1])
-
-
-def _array(tensor: Tensor) -> Any:
-    return tensor.detach().numpy().astype(np.float32).copy()
+        scale = self.centre, self.unit
+        return plain_policy(self.actor, *scale, self.log_std, card)
 
 
 @dataclass
@@ -119,7 +97,7 @@ class Trainer:
         run: whose folder is kept up to date.
     """
 
-    def __init__(self, run: TrainingRun) -> None:
+    def __init__(self, run: TrainingRun[TrainConfig]) -> None:
         config = self._config = run.config
         self._run = run
         torch.manual_seed(config.seed)
@@ -259,7 +237,8 @@ class Trainer:
         return float((ratio.detach() - 1.0 - change.detach()).mean())
 
     def _policy(self) -> NumpyPolicy:
-        card = policy_card(self._config, self._env)
+        labels = self._env.world.observer.layout.labels
+        card = policy_card(self._config, labels)
         return self.model.to_numpy({**card, "steps": self._run.progress.steps})
 
     def _snapshot(self) -> None:
@@ -272,26 +251,15 @@ class Trainer:
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the evaluation's row."""
         run, policy = self._run, self._policy()
-        metrics = grade(
-            lambda mean: policy_driver(policy, "training", mean), run.config
-        )
-        for name, value in metrics.items():
-            self._logger.record(f"eval/{name}", value)
-        row = run.record_evaluation(metrics, self._save)
+        row = evaluate_policy(run, policy, self._logger, self._save)
         if run.config.self_play:
             policy.save(run.checkpoint_path)
         return row
 
     def _save(self, name: str) -> None:
         """Write the policy, and all that it goes on from, under a name."""
-        folder = self._run.folder
-        draft = folder / f"part-{name}.pt"
-        state = {"model": self.model.state_dict()}
-        if name == "last":
-            state["optimizer"] = self._optimizer.state_dict()
-        torch.save(state, draft)
-        draft.replace(folder / f"{name}.pt")
-        self._policy().save(folder / f"{name}.npz")
+        parts = self.model, self._optimizer, self._policy()
+        save_weights(self._run.folder, name, *parts)
 
     def _begin_with(self, run: Path) -> None:
         """Take the weights of a run, of its best policy if there is one.
@@ -318,7 +286,7 @@ class Trainer:
             self._optimizer.load_state_dict(state["optimizer"])
 
 
-def train_with_torch(run: TrainingRun) -> Metrics:
+def train_with_torch(run: TrainingRun[TrainConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return Trainer(run).train()

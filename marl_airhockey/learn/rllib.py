@@ -45,7 +45,7 @@ def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> P
         "unit": layout.unit.tolist(),
         "hidden": config.hidden,
         "log_std_init": config.log_std_init,
-        "card": policy_card(config, probe),
+        "card": policy_card(config, probe.world.observer.layout.labels),
     }
     probe.close()
     rate = config.learning_rate
@@ -101,7 +101,7 @@ def start_ray(runners: int) -> None:
     )
 
 
-def _algorithm_state(run: TrainingRun) -> Path:
+def _algorithm_state(run: TrainingRun[TrainConfig]) -> Path:
     """Return the folder of the algorithm's state at the steps of ``state.json``.
 
     Folders of other steps are leftovers of a killed process.
@@ -109,7 +109,7 @@ def _algorithm_state(run: TrainingRun) -> Path:
     return (run.folder / f"rllib-{run.progress.steps:012d}").resolve()
 
 
-def train_with_rllib(run: TrainingRun) -> Metrics:
+def train_with_rllib(run: TrainingRun[TrainConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     config, folder, progress = run.config, run.folder, run.progress
     torch.set_num_threads(config.torch_threads)

@@ -8,12 +8,16 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
-from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.run_config import RunConfig
 
 ProgressCallback = Callable[[int, int, Metrics], None]
 """Function called with steps done, steps in all, and the latest evaluation"""
+
+
+Config = TypeVar("Config", bound=RunConfig, covariant=True)
 
 
 @dataclass
@@ -40,7 +44,7 @@ class Progress:
         return Progress(**{**data, "best": tuple(data["best"])})
 
 
-class TrainingRun:
+class TrainingRun(Generic[Config]):
     """Folder of a run, kept up to date whatever engine trains.
 
     Args:
@@ -50,7 +54,7 @@ class TrainingRun:
     """
 
     def __init__(
-        self, config: TrainConfig, folder: Path, report: ProgressCallback | None = None
+        self, config: Config, folder: Path, report: ProgressCallback | None = None
     ) -> None:
         self.config, self.folder, self._report = config, folder, report
         state = folder / "state.json"

@@ -23,13 +23,13 @@ from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.toolkit.policies import load_weights
 
 
-def train_with_sb3(run: TrainingRun) -> Metrics:
+def train_with_sb3(run: TrainingRun[TrainConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return _train(run)
 
 
-def _train(run: TrainingRun) -> Metrics:
+def _train(run: TrainingRun[TrainConfig]) -> Metrics:
     config, folder, progress = run.config, run.folder, run.progress
     rate = AdaptiveRate(config, progress.rate or config.learning_rate)
     env = make_training_env(config, config.num_worlds, folder / "pool")
@@ -111,5 +111,5 @@ def build_model(config: TrainConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -
         },
     )
     # SB3 saves it with the model: the file alone says what the policy must see.
-    vars(model)["card"] = policy_card(config, env)
+    vars(model)["card"] = policy_card(config, env.world.observer.layout.labels)
     return model

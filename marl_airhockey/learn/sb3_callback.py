@@ -9,6 +9,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.engine import AdaptiveRate, note_step
 from marl_airhockey.learn.grade import Metrics, grade
 from marl_airhockey.learn.network import to_numpy
@@ -26,7 +27,7 @@ class TrainingCallback(BaseCallback):
         rate: learning rate of the model.
     """
 
-    def __init__(self, run: TrainingRun, rate: AdaptiveRate) -> None:
+    def __init__(self, run: TrainingRun[TrainConfig], rate: AdaptiveRate) -> None:
         super().__init__()
         self.run, self.rate = run, rate
         # The first snapshot is due at once: self-play needs an opponent.

@@ -1,4 +1,4 @@
-"""Training of a policy by PPO, with a choice of engines.
+"""Training of a policy: by PPO with a choice of engines, by SAC, or from recordings.
 
 A run is a folder: ``config.toml`` (all settings and the run format), ``versions.json``,
 progress tables and tensorboard events, ``evaluations.csv``, the best and the last
@@ -15,14 +15,19 @@ from importlib import metadata
 from pathlib import Path
 
 from marl_airhockey.core.errors import require, unknown_name
-from marl_airhockey.learn.config import TrainConfig, load_config
+from marl_airhockey.learn.algorithms import AnyConfig, load_any_config
+from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.grade import Metrics
-from marl_airhockey.learn.run import ProgressCallback, TrainingRun
+from marl_airhockey.learn.hindsight.config import HindsightConfig
+from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
 from marl_airhockey.registry import make_agent
 
 
 def train(
-    config: TrainConfig | None, folder: Path, report: ProgressCallback | None = None
+    config: AnyConfig | None,
+    folder: Path,
+    report: ProgressCallback | None = None,
 ) -> Metrics:
     """Train a policy, or resume a run that was cut off.
 
@@ -40,34 +45,57 @@ def train(
         RuntimeError: a missing extra, with the line that installs it.
     """
     if config is None:
-        config = load_config(folder / "config.toml")
+        config = load_any_config(folder)
     elif (folder / "config.toml").exists():
         raise ValueError(
             f"{folder} holds a run already: --resume it, or say another --out"
         )
+    go_on = _continuation(config, folder, report)
+    if (folder / "config.toml").exists():
+        return go_on()
+    before = set(folder.rglob("*"))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "config.toml").write_text(config.to_toml())
+    (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
+    try:
+        return go_on()
+    except BaseException:
+        # A run that fails to start leaves nothing behind that it has made.
+        if not (folder / "state.json").exists():
+            _remove(folder, before)
+        raise
+
+
+def _continuation(
+    config: AnyConfig, folder: Path, report: ProgressCallback | None
+) -> Callable[[], Metrics]:
+    """Return what trains a run from where it stands to its end.
+
+    Raises:
+        ValueError: an unknown engine or opponent.
+    """
+    if isinstance(config, OfflineConfig):
+        require("stable_baselines3", "train")
+        from marl_airhockey.learn.offline.learner import train_offline
+
+        return lambda: _go_on(train_offline, TrainingRun(config, folder, report))
+    if isinstance(config, HindsightConfig):
+        require("stable_baselines3", "train")
+        from marl_airhockey.learn.hindsight.sac import train_with_hindsight
+
+        return lambda: _go_on(train_with_hindsight, TrainingRun(config, folder, report))
     if config.engine not in ENGINES:
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()
     if config.self_play:  # Refused now, not at the first evaluation.
         for name in {*config.opponents, *config.rivals}:
             make_agent(name)
-    if (folder / "config.toml").exists():
-        return _go_on(engine, TrainingRun(config, folder, report))
-    before = set(folder.rglob("*"))
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "config.toml").write_text(config.to_toml())
-    (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
-    run = TrainingRun(config, folder, report)
-    try:
-        return _go_on(engine, run)
-    except BaseException:
-        # A run that fails to start leaves nothing behind that it has made.
-        if run.progress.steps == 0:
-            _remove(folder, before)
-        raise
+    return lambda: _go_on(engine, TrainingRun(config, folder, report))
 
 
-def _go_on(engine: Engine, run: TrainingRun) -> Metrics:
+def _go_on(
+    engine: Callable[[TrainingRun[Config]], Metrics], run: TrainingRun[Config]
+) -> Metrics:
     return engine(run) if run.steps_left > 0 else run.latest
 
 
@@ -80,7 +108,7 @@ def _remove(folder: Path, kept: set[Path]) -> None:
         folder.rmdir()
 
 
-Engine = Callable[[TrainingRun], Metrics]
+Engine = Callable[[TrainingRun[TrainConfig]], Metrics]
 """Function that trains a run to its end and returns the last evaluation"""
 
 

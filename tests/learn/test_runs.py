@@ -83,7 +83,9 @@ def test_a_finished_run_is_not_overwritten(touch_run):
     assert int(train(None, touch_run)["steps"]) == int(steps)
 
 
-@pytest.mark.parametrize("engine", ["torch", "sb3"])
+@pytest.mark.parametrize(
+    "engine", ["torch", pytest.param("sb3", marks=pytest.mark.slow)]
+)
 def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "marl_airhockey.cli", "train", "touch"]

@@ -1,0 +1,82 @@
+"""Algorithms by name, and the configurations of their runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.learn.config import TrainConfig, load_config, preset, read_settings
+from marl_airhockey.learn.hindsight.config import (
+    ALGO as SAC_HER,
+)
+from marl_airhockey.learn.hindsight.config import (
+    HindsightConfig,
+    hindsight_config,
+    load_hindsight_config,
+)
+from marl_airhockey.learn.offline.config import ALGORITHMS as OFFLINE
+from marl_airhockey.learn.offline.config import (
+    OfflineConfig,
+    load_offline_config,
+    offline_config,
+)
+
+AnyConfig = TrainConfig | OfflineConfig | HindsightConfig
+"""Configuration of a run of any algorithm"""
+PPO = "ppo"
+"""Algorithm that learns wherever nothing else is said"""
+PLAYING: dict[str, Callable[[str, Mapping[str, Any]], AnyConfig]] = {
+    PPO: preset,
+    SAC_HER: hindsight_config,
+}
+"""Makers of configurations of what learns by playing, by algorithm"""
+
+
+def make_config(
+    algo: str,
+    scenario: str,
+    data: Sequence[str | Path],
+    settings: Mapping[str, Any],
+) -> AnyConfig:
+    """Return the configuration of a new run.
+
+    Args:
+        algo: name of the algorithm.
+        scenario: its name; "" for that of the recordings.
+        data: recordings and folders of them, for what learns from them.
+        settings: changes of its settings, by name.
+
+    Raises:
+        ValueError: an unknown name, a bad setting, data that are missing or that
+            nothing is learned from.
+    """
+    if algo in OFFLINE:
+        if not data:
+            raise ValueError(f"algo {algo} learns from recordings; name them as data")
+        named = {"scenario": scenario} if scenario else {}
+        return offline_config(algo, data, {**settings, **named})
+    if algo not in PLAYING:
+        raise ValueError(unknown_name("algo", algo, [*PLAYING, *OFFLINE]))
+    if data:
+        others = " or ".join(OFFLINE)
+        raise ValueError(f"data: {algo} learns by playing; from data do {others}")
+    if not scenario:
+        raise ValueError("say which SCENARIO to train")
+    return PLAYING[algo](scenario, settings)
+
+
+def load_any_config(folder: Path) -> AnyConfig:
+    """Read the configuration of a run of any algorithm.
+
+    Raises:
+        ValueError: see `config.read_settings`.
+    """
+    path = folder / "config.toml"
+    algo = read_settings(path).get("algo", PPO)
+    if algo == PPO:
+        return load_config(path)
+    if algo == SAC_HER:
+        return load_hindsight_config(path)
+    return load_offline_config(path)

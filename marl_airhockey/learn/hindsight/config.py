@@ -1,0 +1,92 @@
+"""Configurations of soft actor-critic with hindsight goals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.learn.config import read_settings
+from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.registry import find_scenario, scenario_names
+
+ALGO = "sac_her"
+"""Name of the algorithm"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HindsightConfig(RunConfig):
+    """Settings of a run; ``total_steps`` are of single worlds, summed over all.
+
+    Raises:
+        ValueError: a value that makes no sense, named.
+    """
+
+    algo: str = ALGO
+    total_steps: int = 500_000
+    num_worlds: int = 32
+    gradient_steps: int = 16
+    """After each step of all worlds"""
+    batch_size: int = 256
+    learning_rate: float = 1e-3
+    gamma: float = 0.95
+    tau: float = 0.02
+    """Share by which the target critics follow in a gradient step"""
+    relabelled: int = 4
+    """Steps with a goal that was met later, for each with its own"""
+    memory_steps: int = 500_000
+    """Steps that are kept to learn from"""
+    learning_starts: int = 8_000
+    """Steps of random actions, with which it begins; all of an episode at least"""
+    hidden: list[int]
+    evaluations: int = 10
+    eval_episodes: int = 200
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.algo != ALGO:
+            raise ValueError(unknown_name("algo", self.algo, [ALGO]))
+        if not has_goals(self.scenario):
+            known = ", ".join(name for name in scenario_names() if has_goals(name))
+            raise ValueError(
+                f"{self.scenario}: it has no goals, as {ALGO} needs; {known} have"
+            )
+
+
+def has_goals(scenario: str) -> bool:
+    """Return True for a scenario with goals."""
+    return isinstance(find_scenario(scenario), GoalScenario)
+
+
+def hindsight_config(scenario: str, changes: Mapping[str, Any]) -> HindsightConfig:
+    """Return the configuration of a run.
+
+    Args:
+        scenario: its name.
+        changes: settings by name.
+
+    Raises:
+        ValueError: a scenario without goals, or a bad setting.
+    """
+    known = [f.name for f in fields(HindsightConfig)]
+    for name in changes:
+        if name not in known:
+            raise ValueError(unknown_name("setting", name, known))
+    options = {**changes.get("options", {}), "goals": "dict"}
+    merged = {"hidden": [256, 256], **changes, "options": options}
+    return HindsightConfig(**{**merged, "scenario": scenario})
+
+
+def load_hindsight_config(path: Path) -> HindsightConfig:
+    """Read what `RunConfig.to_toml` wrote of such a run.
+
+    Raises:
+        ValueError: see `config.read_settings`.
+    """
+    try:
+        return HindsightConfig(**read_settings(path))
+    except TypeError as error:
+        raise ValueError(f"{path} is no training configuration: {error}") from error

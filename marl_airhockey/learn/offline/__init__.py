@@ -1,0 +1,1 @@
+"""Learning from recordings alone, each algorithm in one file."""

@@ -1,0 +1,23 @@
+"""Behaviour cloning: the mean squared error of actions (Pomerleau, 1989)."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from marl_airhockey.learn.offline.actor import Algorithm
+
+
+class BehaviourCloning(Algorithm):
+    """Behaviour cloning; ``share`` below 1 clones the best episodes alone."""
+
+    def losses(self, step: int, *batch: Tensor) -> dict[str, Tensor]:
+        observation, action, *_ = batch
+        error = (self.actor(observation) - action).square()
+        # The deviation is that of the errors; the actor does not care.
+        spread = torch.exp(2 * self.log_std)
+        deviation = (error.detach().mean(0) / spread / 2 + self.log_std).sum()
+        return {"actor": error.sum(-1).mean(), "deviation": deviation}
+
+
+make = BehaviourCloning

@@ -1,0 +1,123 @@
+"""Configurations of learning from recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, ClassVar
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.data.files import recordings_in, shared_head
+from marl_airhockey.learn.config import read_settings
+from marl_airhockey.learn.run_config import RunConfig
+
+STEPS = {"bc": 20_000, "iql": 20_000}
+"""Gradient steps of each algorithm, unless told otherwise"""
+ALGORITHMS = tuple(STEPS)
+"""Names of the algorithms, which are those of their files"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfflineConfig(RunConfig):
+    """Settings of a run that learns from recordings; ``total_steps`` of its gradient.
+
+    Raises:
+        ValueError: a value that makes no sense, named.
+    """
+
+    MAY_BE_ZERO: ClassVar[tuple[str, ...]] = ("seed", "seat")
+
+    algo: str
+    data: list[str]
+    """Files of recordings, and folders of them"""
+    seat: int = 0
+    """Seat whose play is learned from"""
+    share: float = 1.0
+    """Share of the episodes that are used, those of the highest returns"""
+    total_steps: int
+    batch_size: int = 256
+    learning_rate: float = 3e-4
+    gamma: float = 0.99
+    hidden: list[int]
+    evaluations: int = 5
+    eval_episodes: int = 200
+    expectile: float = 0.7
+    """Of IQL: the expectile of the values of actions that a state's value is"""
+    temperature: float = 3.0
+    """Of IQL: how much better actions count more, per unit of advantage"""
+    tau: float = 0.005
+    """Of IQL: share by which targets follow in a step"""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.algo not in ALGORITHMS:
+            raise ValueError(unknown_name("algo", self.algo, ALGORITHMS))
+        if not self.data:
+            raise ValueError(f"data: {self.algo} learns from recordings; name some")
+        for name in ("share", "expectile", "tau"):
+            if not 0 < getattr(self, name) <= 1:
+                raise ValueError(f"{name}: {getattr(self, name)} must be in 0 .. 1")
+
+
+def offline_config(
+    algo: str, data: Sequence[str | Path], changes: Mapping[str, Any]
+) -> OfflineConfig:
+    """Return the configuration of a run on some recordings.
+
+    Scenario, options, observation and the drivers of other seats are those of the
+    recordings; evaluations are in their profile unless ``changes`` has another.
+
+    Args:
+        algo: name of the algorithm.
+        data: files and folders.
+        changes: settings by name.
+
+    Raises:
+        ValueError: no recordings, some that do not fit together, or a bad setting.
+    """
+    if algo not in ALGORITHMS:
+        raise ValueError(unknown_name("algo", algo, ALGORITHMS))
+    known = [f.name for f in fields(OfflineConfig)]
+    for name in changes:
+        if name not in known:
+            raise ValueError(unknown_name("setting", name, known))
+    files = recordings_in([Path(path) for path in data])
+    head = shared_head(files)
+    for name in ("scenario", "options", "observe", "control_dt"):
+        if name in changes and changes[name] != head[name]:
+            raise ValueError(
+                f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r}"
+            )
+    seat = changes.get("seat", 0)
+    drivers = {
+        f"paddle_{i}": player["driver"]
+        for i, player in enumerate(head["players"])
+        if i != seat
+    }
+    settings = {
+        "scenario": head["scenario"],
+        "options": head["options"],
+        "observe": head["observe"],
+        "control_dt": head["control_dt"],
+        "profile": head["profile"],
+        "drivers": drivers,
+        "total_steps": STEPS[algo],
+        "hidden": [256, 256],
+        **changes,
+    }
+    return OfflineConfig(
+        algo=algo, data=[str(path.resolve()) for path in files], **settings
+    )
+
+
+def load_offline_config(path: Path) -> OfflineConfig:
+    """Read what `RunConfig.to_toml` wrote of such a run.
+
+    Raises:
+        ValueError: see `config.read_settings`.
+    """
+    try:
+        return OfflineConfig(**read_settings(path))
+    except TypeError as error:
+        raise ValueError(f"{path} is no training configuration: {error}") from error

@@ -1,0 +1,59 @@
+"""Implicit Q-learning (Kostrikov, Nair and Levine, 2022).
+
+The value of a state is an expectile of the values of the actions in the data, so that
+no action outside it is ever asked for; better actions are cloned with more weight.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from marl_airhockey.learn.layers import TwinLayers, linear_layers
+from marl_airhockey.learn.offline.actor import Algorithm
+from marl_airhockey.learn.offline.config import OfflineConfig
+
+LARGEST_WEIGHT = 100.0
+"""Largest weight of an action, as in the paper"""
+
+
+class ImplicitQLearning(Algorithm):
+    """Implicit Q-learning with two critics, whose targets follow."""
+
+    def __init__(self, config: OfflineConfig, centre: Any, unit: Any) -> None:
+        super().__init__(config, centre, unit)
+        size = len(centre)
+        self.value = linear_layers([size, *config.hidden, 1], 1.0)
+        self.critics = TwinLayers([size + 2, *config.hidden, 1])
+        self.targets = deepcopy(self.critics).requires_grad_(False)
+
+    def losses(self, step: int, *batch: Tensor) -> dict[str, Tensor]:
+        observation, action, reward, after, going = batch
+        both = torch.cat([observation, action], -1)
+        with torch.no_grad():
+            target = self.targets(both).amin(0)
+            ahead = reward + self.config.gamma * going * self.value(after)[:, 0]
+        value = self.value(observation)[:, 0]
+        advantage = target - value
+        weight = torch.exp(self.config.temperature * advantage.detach())
+        density = self.log_density(observation, action)
+        side = torch.where(
+            advantage > 0, self.config.expectile, 1.0 - self.config.expectile
+        )
+        return {
+            "value": (side * advantage.square()).mean(),
+            "critic": (self.critics(both) - ahead).square().mean(-1).sum(),
+            "actor": -(weight.clamp(max=LARGEST_WEIGHT) * density).mean(),
+        }
+
+    @torch.no_grad()
+    def follow(self) -> None:
+        pairs = zip(self.targets.parameters(), self.critics.parameters(), strict=True)
+        for target, critic in pairs:
+            target.lerp_(critic, self.config.tau)
+
+
+make = ImplicitQLearning

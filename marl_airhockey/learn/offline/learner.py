@@ -1,0 +1,129 @@
+"""Learner: the loop around an offline algorithm, with its logs and files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+import torch
+
+from marl_airhockey.learn.engine import (
+    evaluate_policy,
+    make_logger,
+    save_weights,
+    training_threads,
+)
+from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.layers import plain_policy
+from marl_airhockey.learn.network import policy_card
+from marl_airhockey.learn.offline.actor import Algorithm
+from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.offline.dataset import load_dataset
+from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.world.build import build_world
+
+REPORT = 500
+"""Steps from one report of progress to the next"""
+
+
+class Learner:
+    """Learner of one run.
+
+    Args:
+        run: whose folder is kept up to date.
+
+    Raises:
+        ValueError: recordings that cannot be learned from.
+    """
+
+    def __init__(self, run: TrainingRun[OfflineConfig]) -> None:
+        config = self._config = run.config
+        self._run = run
+        world = build_world(config.scenario, 1, True, config.keywords)
+        layout = world.observer.layout
+        world.close()
+        self._card = policy_card(config, layout.labels)
+        files = [Path(path) for path in config.data]
+        shape = config.seat, config.share, config.gamma, len(layout.centre)
+        self._data = load_dataset(files, *shape)
+        # A resumed run draws other steps than those of its beginning.
+        torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
+        make: Callable[[OfflineConfig, object, object], Algorithm] = import_module(
+            f"marl_airhockey.learn.offline.{config.algo}"
+        ).make
+        self.model = make(config, layout.centre, layout.unit)
+        learned = [p for p in self.model.parameters() if p.requires_grad]
+        self._optimizer = torch.optim.Adam(learned, config.learning_rate, fused=True)
+        if run.progress.steps:
+            state = torch.load(run.folder / "last.pt", weights_only=True)
+            self.model.load_state_dict(state["model"])
+            self._optimizer.load_state_dict(state["optimizer"])
+        self._logger = make_logger(run.folder, run.progress.steps)
+
+    def train(self) -> Metrics:
+        """Train to the end of the run; return the last evaluation."""
+        try:
+            return self._train()
+        finally:
+            self._logger.close()
+
+    def _train(self) -> Metrics:
+        run, row = self._run, self._run.latest
+        run.start_clock()
+        while run.steps_left > 0:
+            first = run.progress.steps
+            last = min(first + REPORT, self._config.total_steps)
+            for step in range(first, last):
+                losses = self.descend(step)
+            run.update_progress(last, self._config.learning_rate)
+            for name, value in losses.items():
+                self._logger.record(f"train/{name}", value)
+            if run.evaluation_due or run.steps_left <= 0:
+                row = self._evaluate()
+            self._logger.dump(last)
+        return row
+
+    def descend(self, step: int) -> dict[str, float]:
+        """Descend once on a batch of steps; return the losses."""
+        model = self.model
+        observation, action, reward, after, going = self._data.draw(
+            self._config.batch_size
+        )
+        # Half a cosine, to nothing at the end (Kostrikov et al., for the actor).
+        rate = 0.5 * (1.0 + math.cos(math.pi * step / self._config.total_steps))
+        for group in self._optimizer.param_groups:
+            group["lr"] = self._config.learning_rate * rate
+        losses = model.losses(
+            *(step, model.scaled(observation), action, reward),
+            *(model.scaled(after), going),
+        )
+        self._optimizer.zero_grad(set_to_none=True)
+        torch.stack(list(losses.values())).sum().backward()  # type: ignore[no-untyped-call]
+        self._optimizer.step()
+        model.follow()
+        return {name: float(loss.detach()) for name, loss in losses.items()}
+
+    def policy(self) -> NumpyPolicy:
+        """Return the policy as it is."""
+        model = self.model
+        card = {**self._card, "algo": self._config.algo}
+        card["steps"] = self._run.progress.steps
+        return plain_policy(model.actor, model.centre, model.unit, model.log_std, card)
+
+    def _evaluate(self) -> Metrics:
+        """Evaluate and save the policy; return the evaluation's row."""
+        return evaluate_policy(self._run, self.policy(), self._logger, self._save)
+
+    def _save(self, name: str) -> None:
+        """Write the policy, and all that it goes on from, under a name."""
+        parts = self.model, self._optimizer, self.policy()
+        save_weights(self._run.folder, name, *parts)
+
+
+def train_offline(run: TrainingRun[OfflineConfig]) -> Metrics:
+    """Train a run from where it stands to its end; return the last evaluation."""
+    with training_threads(run.config.torch_threads):
+        return Learner(run).train()

@@ -1,0 +1,91 @@
+"""Settings that every run has, whatever it learns from, and their form as TOML."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, ClassVar
+
+from marl_airhockey.registry import DEFAULT_BACKEND
+from marl_airhockey.toolkit.policies import RUN_FORMAT
+from marl_airhockey.world.build import Keywords
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunConfig:
+    """Settings of a run.
+
+    Raises:
+        ValueError: a value that makes no sense, named.
+    """
+
+    MAY_BE_ZERO: ClassVar[tuple[str, ...]] = ("seed",)
+    """Numbers that need not be above 0"""
+
+    scenario: str
+    seed: int = 0
+    backend: str = DEFAULT_BACKEND
+    profile: str = "ideal"
+    observe: str = "velocity"
+    options: dict[str, Any] = field(default_factory=dict)
+    """Values of the scenario's own fields, by name"""
+    drivers: dict[str, str] = field(default_factory=dict)
+    """Drivers of seats that are not learned, by agent"""
+    physics: dict[str, Any] = field(default_factory=dict)
+    """Physical parameters, by name: numbers or ranges"""
+    control_dt: float = 0.05
+    """s between two actions; `gamma` is of one of them"""
+    total_steps: int
+    batch_size: int
+    learning_rate: float
+    gamma: float
+    hidden: list[int]
+    """Widths of the hidden layers; networks share none"""
+    evaluations: int
+    """Number of evaluations during training"""
+    eval_episodes: int
+    torch_threads: int = 1
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if f.type in ("int", "float") and not number:
+                raise ValueError(f"{f.name}: expected a number, got {value!r}")
+            if f.type == "int" and int(value) != value:
+                raise ValueError(f"{f.name}: expected a whole number, got {value!r}")
+            if number and f.name not in self.MAY_BE_ZERO and value <= 0:
+                raise ValueError(f"{f.name}: {value} must be above 0")
+        if not self.hidden or any(w < 1 for w in self.hidden):
+            raise ValueError(f"hidden: {self.hidden} must be widths above 0")
+
+    @property
+    def keywords(self) -> Keywords:
+        """Keywords of the environments of evaluations."""
+        return {
+            "backend": self.backend,
+            "profile": self.profile,
+            "observe": self.observe,
+            "options": self.options,
+            "drivers": self.drivers,
+            "physics": self.physics,
+            "control_dt": self.control_dt,
+        }
+
+    def to_toml(self) -> str:
+        """Return the configuration as TOML, readable by `config.load_config`."""
+        lines, tables = [f"format = {RUN_FORMAT}"], []
+        for name, value in asdict(self).items():
+            if isinstance(value, dict):
+                tables.append(f"\n[{name}]")
+                tables += [f"{k} = {_toml(v)}" for k, v in value.items()]
+            else:
+                lines.append(f"{name} = {_toml(value)}")
+        return "\n".join([*lines, *tables]) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return str(value)

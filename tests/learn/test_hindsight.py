@@ -1,0 +1,80 @@
+"""SAC with hindsight goals: its policy as plain arrays, its files, what it refuses."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+from typer.testing import CliRunner
+
+from marl_airhockey.cli.main import app
+from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.learn.hindsight.config import hindsight_config
+from marl_airhockey.learn.hindsight.sac import Evaluations, build_model
+from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.learn.train import load_any_config, train
+from marl_airhockey.toolkit.policies import load_policy
+
+SMALL = {
+    "num_worlds": 4,
+    "hidden": [32, 32],
+    "learning_starts": 1,
+    "gradient_steps": 1,
+    "total_steps": 1600,
+    "evaluations": 2,
+    "eval_episodes": 20,
+}
+
+
+def test_the_policy_of_a_file_is_that_of_the_model(tmp_path):
+    config = hindsight_config("reach", SMALL)
+    env = AirHockeyVecEnv("reach", 4, **config.keywords)
+    model = build_model(config, env)
+    model.learn(1200)
+    run = TrainingRun(config, tmp_path)
+    callback = Evaluations(run)
+    callback.init_callback(model)
+    policy = callback._policy()
+    seen = env.reset()
+    wanted, _ = model.predict(seen, deterministic=True)
+    np.testing.assert_allclose(policy(seen), wanted, atol=1e-5)
+    assert np.isfinite(policy.log_std).all()
+
+
+def test_a_run_that_was_cut_goes_on(tmp_path):
+    config = hindsight_config("reach", SMALL)
+
+    class Cut(Exception):
+        pass
+
+    def stop(done, total, row):
+        if row:
+            raise Cut
+
+    with pytest.raises(Cut):
+        train(config, tmp_path / "run", stop)
+    assert load_any_config(tmp_path / "run") == config
+    row = train(None, tmp_path / "run")
+    assert row["steps"] >= config.total_steps
+    policy = load_policy(tmp_path / "run")
+    found = evaluate(policy, "run", "reach", 20, keywords=config.keywords)
+    assert 0.0 <= found.success <= 1.0
+
+
+def test_a_scenario_without_goals_is_named():
+    with pytest.raises(ValueError, match=r"juggle: it has no goals.*hit_goal.*reach"):
+        hindsight_config("juggle", {})
+
+
+def test_a_run_shorter_than_an_episode_is_named(tmp_path):
+    config = hindsight_config("reach", {**SMALL, "total_steps": 100})
+    with pytest.raises(ValueError, match="total_steps: 100 must be above"):
+        train(config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_command_refuses_recordings(tmp_path):
+    command = ["train", "reach", "--algo", "sac_her", "--data", str(tmp_path)]
+    with pytest.raises(ValueError, match="sac_her learns by playing"):
+        CliRunner().invoke(app, command, catch_exceptions=False)
