@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+    from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
 from marl_airhockey.world.build import Keywords, build_world
 
 
@@ -97,6 +98,21 @@ def make_sb3_vec(
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 
     return AirHockeyVecEnv(scenario, num_worlds, **keywords)
+
+
+def make_torchrl(
+    scenario: str | Scenario,
+    num_worlds: int = 1,
+    device: str = "cpu",
+    **keywords: Unpack[Keywords],
+) -> AirHockeyTorchEnv:
+    """Build a TorchRL EnvBase of batch size (num_worlds,), a group for each team."""
+    from marl_airhockey.core.errors import require
+
+    require("torchrl", "ecosystem")
+    from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
+
+    return AirHockeyTorchEnv(scenario, num_worlds, device, **keywords)
 
 
 VERSIONED = re.compile(r"([a-z]\w*)_v(\d+)")

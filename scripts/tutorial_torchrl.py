@@ -2,9 +2,8 @@
 
     python scripts/tutorial_torchrl.py --updates 20
 
-`PettingZooWrapper` takes the environment as it is; `group_map` puts the mates into one
-group and `return_state` gives the critic what no agent sees alone. TorchRL steps one
-world at a time: take it for its algorithms (and BenchMARL's), not for speed.
+`make_torchrl` steps many worlds as one environment; the mates are one group, and the
+key ``state`` gives the critic what no agent sees alone.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from typing import Annotated
 
 import torch
 import typer
+from tensordict import TensorDictBase
 from tensordict.nn import TensorDictModule
 from tensordict.nn.distributions import NormalParamExtractor
 from torch import nn
 from torchrl.collectors import Collector
 from torchrl.envs import RewardSum, TransformedEnv, check_env_specs
-from torchrl.envs.libs.pettingzoo import PettingZooWrapper
 from torchrl.modules import MultiAgentMLP, ProbabilisticActor, TanhNormal
 from torchrl.objectives import ClipPPOLoss, ValueEstimators
 
@@ -47,23 +46,23 @@ class StateCritic(nn.Module):
         return value[..., None, :].expand(*value.shape[:-1], self.agents, 1)
 
 
-def make_rally() -> TransformedEnv:
-    """Return a rally as TorchRL needs it, with the return of episodes."""
-    raw = ah.parallel_env("rally")
-    env = PettingZooWrapper(
-        raw,
-        return_state=True,
-        group_map=raw.group_map,
-        use_mask=False,
-        categorical_actions=False,
-    )
+def make_rally(worlds: int) -> TransformedEnv:
+    """Return rallies with the return of their episodes."""
     returns = RewardSum(in_keys=[(GROUP, "reward")], out_keys=[(GROUP, "returns")])
-    return TransformedEnv(env, returns)
+    return TransformedEnv(ah.make_torchrl("rally", worlds), returns)
+
+
+def share_ends(data: TensorDictBase) -> None:
+    """Tell each agent that the episode of all has ended, as the loss wants it."""
+    after = data["next"]
+    for end in ("done", "terminated"):
+        shape = after[GROUP, "reward"].shape
+        after[GROUP, end] = after[end].unsqueeze(-2).expand(shape)
 
 
 def make_actor(env: TransformedEnv) -> ProbabilisticActor:
     """Return a policy that all agents share, each acting on its own observation."""
-    agents, size = env.observation_spec[GROUP, "observation"].shape
+    agents, size = env.observation_spec[GROUP, "observation"].shape[-2:]
     network = nn.Sequential(
         MultiAgentMLP(
             size, 4, agents, centralized=False, share_params=True, depth=2, num_cells=64
@@ -84,7 +83,7 @@ def make_actor(env: TransformedEnv) -> ProbabilisticActor:
 
 def make_loss(env: TransformedEnv, actor: ProbabilisticActor) -> ClipPPOLoss:
     """Return PPO's loss with a critic of the global state."""
-    agents = env.observation_spec[GROUP, "observation"].shape[0]
+    agents = env.observation_spec[GROUP, "observation"].shape[-2]
     critic = TensorDictModule(
         StateCritic(env.observation_spec["state"].shape[-1], agents),
         in_keys=["state"],
@@ -105,13 +104,14 @@ def make_loss(env: TransformedEnv, actor: ProbabilisticActor) -> ClipPPOLoss:
 
 def main(
     updates: Annotated[int, typer.Option(help="Policy updates.")] = 20,
-    frames: Annotated[int, typer.Option(help="Steps between two updates.")] = 2000,
+    frames: Annotated[int, typer.Option(help="Steps between two updates.")] = 6400,
+    worlds: Annotated[int, typer.Option(help="Stepped as one environment.")] = 64,
     seed: Annotated[int, typer.Option(help="Of network and environment.")] = 0,
 ) -> None:
     """Check the environment, then train."""
     torch.manual_seed(seed)
     torch.set_num_threads(1)
-    env = make_rally()
+    env = make_rally(worlds)
     env.set_seed(seed)
     check_env_specs(env)
     actor = make_actor(env)
@@ -125,6 +125,7 @@ def main(
         auto_register_policy_transforms=False,
     )
     for update, data in enumerate(collector):
+        share_ends(data)
         with torch.no_grad():
             loss.value_estimator(data)
         flat = data.reshape(-1)

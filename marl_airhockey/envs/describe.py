@@ -12,7 +12,7 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.profiles import PROFILES, delay_of
+from marl_airhockey.core.profiles import PROFILES, delay_of, find_profile
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
 from marl_airhockey.registry import (
@@ -71,7 +71,7 @@ def summary() -> dict[str, Any]:
 
 def describe_profile(name: str) -> dict[str, Any]:
     """Return what a profile senses and from which ranges its physics is drawn."""
-    profile = PROFILES[name]
+    profile = find_profile(name)
     least, longest = (1000.0 * end for end in delay_of(profile))
     follows = {key: follow.range for key, follow in profile.follows.items()}
     times = {f"{key} (times)": pair for key, pair in profile.shares.items()}

@@ -27,7 +27,8 @@ def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, 
     """Return the info of an open seat of the only world.
 
     Keys: ``applied_action`` (2,), ``success`` (latched), ``first_shot``, ``alive``,
-    ``cost``, ``constraint/speed`` and so on, and ``reward/<term>``.
+    ``cost``, ``constraint/speed`` and so on, and ``reward/<term>``; on a real table
+    ``interruption``, why it ended the episode, or "".
 
     Args:
         result: of a step of one world.
@@ -51,6 +52,8 @@ def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, 
     }
     for name, term in result.terms.items():
         info[_term(name)] = term.item(i)
+    if world.backend.realtime:
+        info["interruption"] = result.interruption
     return info
 
 

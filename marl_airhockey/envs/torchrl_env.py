@@ -1,0 +1,165 @@
+"""TorchRL EnvBase over B worlds, with a group of agents for each team."""
+
+from __future__ import annotations
+
+from typing import Any, Unpack
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from tensordict import TensorDict, TensorDictBase
+from torchrl.data import Bounded, Categorical, Composite, Unbounded
+from torchrl.envs import EnvBase
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.envs.global_state import GlobalState
+from marl_airhockey.envs.spaces import observation_space
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.observer import Observation
+
+
+class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
+    """B worlds as one environment of batch size (B,), as TorchRL and BenchMARL take it.
+
+    The open seats of team k are the group ``team_k`` of n agents, with the keys
+    ``(team_k, "observation")`` (B, n, D), ``(team_k, "action")`` (B, n, 2) and
+    ``(team_k, "reward")`` (B, n, 1), all float32. Beside the groups are ``state``
+    (B, S), what a central critic may know, see `global_state.GlobalState`, and
+    ``done``, ``terminated`` and ``truncated`` (B, 1). Worlds that
+    ended wait for a reset by ``_reset``, as collectors and rollouts give it.
+
+    Args:
+        scenario: its name, or a scenario object.
+        num_worlds: B.
+        device: of the tensors; physics stays on the CPU.
+        **keywords: see `make.build_world`.
+
+    Raises:
+        ValueError: observations are not flat numbers (pictures, goals as dicts).
+    """
+
+    batch_locked = True
+
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        num_worlds: int = 1,
+        device: torch.device | str = "cpu",
+        **keywords: Unpack[Keywords],
+    ) -> None:
+        super().__init__(device=device, batch_size=[num_worlds])
+        self.world = build_world(
+            scenario, num_worlds, autoreset=False, keywords=keywords
+        )
+        seats = self.world.scene.seats
+        teams = np.array([seats[i].team for i in self.world.open])
+        rows = {f"team_{k}": np.flatnonzero(teams == k) for k in np.unique(teams)}
+        self._rows: dict[str, Array] = rows
+        self.group_map = {
+            group: [f"paddle_{self.world.open[i]}" for i in mine]
+            for group, mine in rows.items()
+        }
+        """Names of the agents of each group."""
+        self._global_state = GlobalState(self.world)
+        self._make_specs()
+
+    def _make_specs(self) -> None:
+        own = observation_space(self.world.observer)
+        if not isinstance(own, spaces.Box) or len(own.shape) != 1:
+            raise ValueError(
+                f"observations: TorchRL's environment shows flat numbers, not {own}; "
+                'take another observe=, and goals="flat"'
+            )
+        batch, device = tuple(self.batch_size), self.device
+        whole = self._global_state.space
+        low, high = torch.as_tensor(whole.low), torch.as_tensor(whole.high)
+        observation: dict[str, Any] = {
+            "state": Bounded(
+                low.expand(*batch, -1), high.expand(*batch, -1), device=device
+            )
+        }
+        action, reward = {}, {}
+        for group, mine in self._rows.items():
+            shape = (*batch, len(mine))
+            low, high = torch.as_tensor(own.low), torch.as_tensor(own.high)
+            seen = Bounded(
+                low.expand(*shape, -1), high.expand(*shape, -1), device=device
+            )
+            moved = Bounded(-1.0, 1.0, (*shape, 2), device)
+            paid = Unbounded((*shape, 1), device)
+            observation[group] = Composite({"observation": seen}, shape=shape)
+            action[group] = Composite({"action": moved}, shape=shape)
+            reward[group] = Composite({"reward": paid}, shape=shape)
+        flag = Categorical(2, (*batch, 1), device, torch.bool)
+        flags = {name: flag.clone() for name in ("done", "terminated", "truncated")}
+        self.observation_spec = Composite(observation, shape=batch)
+        self.action_spec = Composite(action, shape=batch)
+        self.reward_spec = Composite(reward, shape=batch)
+        self.done_spec = Composite(flags, shape=batch)
+
+    @property
+    def observation_labels(self) -> tuple[str, ...]:
+        """Name of each element of an agent's observation."""
+        return self.world.observer.labels
+
+    @property
+    def state_labels(self) -> tuple[str, ...]:
+        """Name of each element of ``state``."""
+        return self._global_state.labels
+
+    def _set_seed(self, seed: int | None) -> None:
+        self.world.seed(seed)
+
+    def _reset(
+        self, tensordict: TensorDictBase | None = None, **_: Any
+    ) -> TensorDictBase:
+        some = None if tensordict is None else tensordict.get("_reset", None)
+        if some is None or bool(some.all()):
+            observation = self.world.reset()
+        else:
+            self.world.reset_worlds(np.flatnonzero(some.numpy(force=True)))
+            observation = self.world.observation()
+        going = np.zeros(self.world.num_worlds, np.bool_)
+        return self._tensors(observation, going, going)
+
+    def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
+        worlds, seats = self.world.num_worlds, len(self.world.open)
+        actions = np.empty((worlds, seats, 2))
+        for group, mine in self._rows.items():
+            actions[:, mine] = tensordict[group, "action"].numpy(force=True)
+        result = self.world.step(actions)
+        after = self._tensors(result.observation, result.terminated, result.truncated)
+        reward = self._tensor(result.reward)[..., None]
+        for group, mine in self._rows.items():
+            after[group, "reward"] = reward[:, mine]
+        return after
+
+    def _tensors(
+        self, observation: Observation, terminated: Array, truncated: Array
+    ) -> TensorDict:
+        """Return what a reset and a step both give."""
+        batch, seen = self.batch_size, self._tensor(observation)
+        ended, out_of_time = (
+            torch.as_tensor(flag.copy(), device=self.device)[:, None]
+            for flag in (terminated, truncated)
+        )
+        groups = {
+            group: TensorDict({"observation": seen[:, mine]}, [*batch, len(mine)])
+            for group, mine in self._rows.items()
+        }
+        whole = {
+            "state": self._tensor(self._global_state.read()),
+            "done": ended | out_of_time,
+            "terminated": ended,
+            "truncated": out_of_time,
+        }
+        return TensorDict({**groups, **whole}, batch, device=self.device)
+
+    def _tensor(self, array: Any) -> torch.Tensor:
+        return torch.as_tensor(array, dtype=torch.float32, device=self.device)
+
+    def close(self, *, raise_if_closed: bool = True) -> None:
+        """Close the physics."""
+        super().close(raise_if_closed=raise_if_closed)
+        self.world.close()
