@@ -5,6 +5,10 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 FAR := .venv-distributed
+JOBS ?= 2
+# Devices, pages and their users run in real time: nothing runs beside them.
+REALTIME := tests/lab tests/devices tests/play
+TEST = $(BIN)/pytest -n $(JOBS) --dist worksteal $(addprefix --ignore=,$(REALTIME))
 
 help: ## Show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
@@ -19,7 +23,7 @@ $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,offline,ecosystem,dev]'
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,hardware,offline,ecosystem,dev]'
 	$(BIN)/pip install --quiet --constraint constraints.txt --no-deps robosuite
 	@echo "what pip says of robosuite above does no harm: it comes without what it names"
 	$(BIN)/pip install --quiet --constraint constraints.txt mujoco scipy termcolor tqdm
@@ -29,13 +33,15 @@ demo: setup ## Train a paddle to juggle and show it (a minute)
 	$(BIN)/airhockey demo
 
 test: setup lint ## Run linters, types and the tests that are not slow
-	$(BIN)/pytest -m 'not slow'
+	$(TEST) -m 'not slow'
+	$(BIN)/pytest -m 'not slow' $(REALTIME)
 
 test-one: setup ## Run the tests of one scenario or driver: make test-one NAME=my_task
 	$(BIN)/pytest tests/suites -m 'not slow' --only $(NAME)
 
 test-all: setup lint ## Run every test
-	$(BIN)/pytest
+	$(TEST)
+	$(BIN)/pytest $(REALTIME)
 
 # RLlib pins an older gymnasium, so it has an environment of its own.
 $(FAR)/.ready: pyproject.toml constraints.txt

@@ -91,28 +91,36 @@ def train(
     scenario: str,
     folder: str | Path | None = None,
     *,
+    algo: str = "ppo",
+    data: Sequence[str | Path] = (),
     report: ProgressCallback | None = None,
     **settings: Any,
 ) -> TrainingResult:
-    """Train a policy with PPO and the preset of a scenario.
+    """Train a policy with PPO and the preset of a scenario, or by another algorithm.
 
     Args:
         scenario: a name, or code, see `registry.find_scenario`.
         folder: of the run; None for ``runs/SCENARIO-SEED``.
+        algo: "ppo"; "sac_her", for scenarios with goals; "bc" or "iql", which learn
+            from recordings.
+        data: files of recordings and folders of them, for those.
         report: called with steps done, steps in all and the latest evaluation.
-        **settings: changes of the preset, see `learn.config.TrainConfig`:
-            `total_steps`, `seed`, `profile`, `observe`, `options`, `drivers` and so on.
+        **settings: changes of the preset, see `learn.config.TrainConfig`,
+            `learn.hindsight.config.HindsightConfig` and
+            `learn.offline.config.OfflineConfig`: `total_steps`, `seed`, `profile`,
+            `observe`, `options`, `drivers` and so on.
 
     Raises:
         ValueError: an unknown scenario or setting, or a folder that holds a run.
         RuntimeError: a missing extra, with the line that installs it.
     """
-    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.algorithms import make_config
     from marl_airhockey.learn.train import train as train_config
 
-    config = preset(scenario, settings)
+    config = make_config(algo, scenario, data, settings)
     name = find_scenario(scenario).name
-    place = Path(folder or Path("runs") / f"{name}-{config.seed}")
+    kind = "" if algo == "ppo" else f"{algo}-"
+    place = Path(folder or Path("runs") / f"{name}-{kind}{config.seed}")
     row = train_config(config, place, report)
     return TrainingResult(place, int(row["steps"]), dict(row))
 

@@ -67,6 +67,19 @@ def agent_names() -> list[str]:
     return _names("agents")
 
 
+def plain_agent_names() -> list[str]:
+    """Return the names of drivers that need no option: no file, no device."""
+    makers = {n: _maker("driver", "agents", "drivers", n) for n in agent_names()}
+    return [
+        name
+        for name, make in makers.items()
+        if all(
+            p.default is not p.empty
+            for p in inspect.signature(make).parameters.values()
+        )
+    ]
+
+
 def backend_names() -> list[str]:
     """Return the names of all backends: the folders of ``backends/``."""
     return _names("backends")

@@ -42,6 +42,8 @@ class TeamJuggle(Scenario):
     """Number of paid hits that is a success."""
     gap: float = 0.10
     """Distance between the reaches of the seats (m)."""
+    lift_weight: float = 0.0
+    """Reward of both for any hit that raises a puck by ``lift``, paid or not."""
 
     @cached_property
     def scene(self) -> Scene:
@@ -68,6 +70,7 @@ class TeamJuggle(Scenario):
             "striker": nobody,
             "passer": nobody.copy(),
             "passes": np.zeros(len(rng)),
+            "lifted": np.zeros(len(rng)),
         }
 
     def update_memory(self, t: Transition) -> Memory:
@@ -80,6 +83,7 @@ class TeamJuggle(Scenario):
             "striker": striker,
             "passer": np.where(risen, striker, passer),
             "passes": t.memory["passes"] + passed.sum(-1),
+            "lifted": t.memory["lifted"] + risen.sum(-1),
         }
 
     observation = (
@@ -97,9 +101,14 @@ class TeamJuggle(Scenario):
         """Return the terms.
 
         pass: 1 for both when the puck, raised by one paddle, is raised by the other.
+        lift: ``lift_weight`` for both when any hit has raised a puck.
         """
         passed = t.new_memory["passes"] - t.memory["passes"]
-        return {"pass": passed[..., None] * np.ones(2)}
+        terms = {"pass": passed[..., None] * np.ones(2)}
+        if self.lift_weight:
+            lifted = t.new_memory["lifted"] - t.memory["lifted"]
+            terms["lift"] = self.lift_weight * lifted[..., None] * np.ones(2)
+        return terms
 
     def terminated(self, t: Transition) -> Array:
         return np.asarray(t.after.crossed[..., 0].any(-1))

@@ -90,15 +90,21 @@ def config_of(task: str, profile: str, variant: str, seed: int) -> TrainConfig:
 def recipe(config: TrainConfig) -> str:
     """Return a short name of all settings but the seed.
 
-    Those at their defaults are left out, so that another setting changes no name.
+    Those at their defaults are left out, so that neither another setting nor another
+    default of one that does not matter here changes a name.
     """
-    usual = {f.name: f.default for f in dataclasses.fields(config)}
+    usual = {f.name: _default(f) for f in dataclasses.fields(config)}
     settings = {
         name: value
         for name, value in dataclasses.asdict(config).items()
         if name != "seed" and value not in ({}, usual[name])
     }
-    return hashlib.sha256(repr(settings).encode()).hexdigest()[:8]
+    return hashlib.sha256(repr(sorted(settings.items())).encode()).hexdigest()[:8]
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    factory = field.default_factory
+    return field.default if factory is dataclasses.MISSING else factory()
 
 
 def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Rows]:

@@ -4,22 +4,14 @@ import shutil
 from typing import ClassVar
 
 import pytest
+from names import GOALS, ideal_backends, seats
 
 import marl_airhockey as ah
+from marl_airhockey.registry import plain_agent_names
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("MUJOCO_GL", "egl")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
-
-
-def seats(scenario):
-    return len(ah.make_scenario(scenario).scene.seats)
-
-
-def ideal_backends():
-    modules = {n: f"marl_airhockey.backends.{n}" for n in ah.backend_names()}
-    return [n for n, m in modules.items() if importlib.import_module(m).make.ideal]
 
 
 def pytest_addoption(parser):
@@ -37,6 +29,10 @@ def pytest_collection_modifyitems(config, items):
     items[:] = kept
 
 
+LARGE = ("doubles", "free_for_all")
+"""Games that take several times as long to compile as all else"""
+
+
 class _Plain:
     """Parameters of a test that has none."""
 
@@ -49,12 +45,16 @@ def pytest_generate_tests(metafunc):
         "scenario": ah.scenario_names,
         "single": lambda: [n for n in ah.scenario_names() if seats(n) == 1],
         "backend": ideal_backends,
-        "agent": lambda: [n for n in ah.agent_names() if n != "policy"],
+        "agent": plain_agent_names,
         "goal_scenario": lambda: GOALS,
     }
     for name, names in found.items():
         if name in metafunc.fixturenames:
-            metafunc.parametrize(name, names())
+            given = names()
+            if metafunc.definition.get_closest_marker("compiles_much"):
+                large = [pytest.param(n, marks=pytest.mark.slow) for n in LARGE]
+                given = [n for n in given if n not in LARGE] + large
+            metafunc.parametrize(name, given)
 
 
 @pytest.fixture(scope="session", autouse=True)

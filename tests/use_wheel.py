@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 
 import marl_airhockey as ah
+from marl_airhockey import registry
 
 assert "site-packages" in ah.__file__, ah.__file__
 assert len(ah.scenario_names()) >= 10
@@ -21,9 +22,8 @@ assert env.reset(seed=0)[0].shape == env.observation_space.shape
 with_a_mate = ah.parallel_env("rally", drivers={"paddle_1": "zoo/rally"})
 with_a_mate.reset(seed=0)
 with_a_mate.step({"paddle_0": np.zeros(2, np.float32)})
-for driver in ah.agent_names():
-    if driver != "policy":
-        ah.make_agent(driver)
+for driver in registry.plain_agent_names():
+    ah.make_agent(driver)
 with contextlib.suppress(RuntimeError):
     ah.make_sb3_vec("juggle")
     sys.exit("the bare wheel has no stable-baselines3, and must say so")

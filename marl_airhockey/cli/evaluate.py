@@ -26,6 +26,13 @@ from marl_airhockey.cli.options import (
     environment,
     scenario_for,
 )
+from marl_airhockey.cli.real_table import (
+    REAL,
+    LabOption,
+    RigOption,
+    name_on_table,
+    real_table,
+)
 from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 from marl_airhockey.toolkit.policies import Policy
@@ -47,22 +54,30 @@ def evaluate_driver(
     physics: Physics = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     num_workers: Workers = None,
+    lab: LabOption = False,
+    rig: RigOption = None,
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure a driver over episodes that training never sees."""
+    """Measure a driver over episodes that training never sees.
+
+    On a real table, or in the virtual lab, the driver plays alone: no floors, and a
+    policy does not sample.
+    """
     keywords = environment(backend, profile, option, other, physics)
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
+    driver = name_on_table(driver, backend)
     seated = make_agent(driver)
     entries, scenario = [(driver, seated)], scenario_for(seated, scenario)
-    if isinstance(seated, Policy):
+    simulated = backend != REAL
+    if isinstance(seated, Policy) and simulated:
         sampled = replace(seated, deterministic=False)
         entries.append((f"{driver} (sampled)", sampled))
-    if floors:
+    if floors and simulated:
         entries += [(f, make_agent(f)) for f in FLOORS if f != driver]
     results: list[EvaluationResult] = []
-    with bar() as progress:
+    with real_table(keywords, lab, rig) as keywords, bar() as progress:
         task = progress.add_task(scenario, total=len(entries), note="")
         for name, entry in entries:
             progress.update(task, note=name)
@@ -97,6 +112,7 @@ def result_table(results: list[EvaluationResult]) -> Table:
         "  interquartile": lambda r: f"{r.returns_iqm:.2f}",
         "  95 % from ": lambda r: f"{r.returns_interval[0]:.2f}",
         "  95 % to ": lambda r: f"{r.returns_interval[1]:.2f}",
+        "interrupted": lambda r: f"{r.interrupted}",
         "control steps": lambda r: f"{r.length:.0f}",
         "touches": lambda r: f"{r.hits:.1f}",
         "violations a minute": lambda r: f"{r.deployability.violations_per_minute:.0f}",
@@ -105,6 +121,8 @@ def result_table(results: list[EvaluationResult]) -> Table:
         "ms an action": lambda r: f"{r.deployability.act_ms:.2f}",
         "deployability": lambda r: r.deployability.grade,
     }
+    if first.backend != REAL:
+        del lines["interrupted"]
     for name, line in lines.items():
         table.add_row(name, *(line(result) for result in results))
     return table

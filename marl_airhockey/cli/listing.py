@@ -14,7 +14,7 @@ from marl_airhockey.cli.options import (
     console,
 )
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.profiles import PROFILES
+from marl_airhockey.core.profiles import PROFILES, SUFFIX
 from marl_airhockey.envs.describe import describe, describe_profile, summary
 from marl_airhockey.registry import plugin_names, runs_code, scenario_names
 
@@ -41,7 +41,7 @@ def list_scenarios(
         console.print("backends:", ", ".join(data["backends"]))
         console.print("profiles:", ", ".join(data["profiles"]))
         return
-    if scenario in PROFILES:
+    if scenario in PROFILES or scenario.endswith(SUFFIX):
         _show_profile(scenario, as_json)
         return
     known = [*scenario_names(), *plugin_names("scenarios"), *PROFILES]

@@ -11,16 +11,23 @@ import typer
 from marl_airhockey import __version__
 from marl_airhockey.cli import (
     bench,
+    calibrate,
+    calibrate_arm,
+    calibrate_delay,
     challenge,
     crossplay,
+    data,
     evaluate,
+    lab,
     league,
     listing,
     new,
     play,
     study,
+    teleop,
     train,
     transfer,
+    trials,
     warm,
     watch,
 )
@@ -44,17 +51,21 @@ __all__ = [
     "main",
     "new",
     "train",
+    "trials",
     "warm",
     "watch",
 ]
 app.command()(league.league)
 app.command()(play.play)
+app.command()(teleop.teleop)
 app.command()(transfer.transfer)
 app.command()(transfer.fit)
-record = typer.Typer(help="Recordings of play.", no_args_is_help=True)
-record.command()(play.report)
-app.add_typer(record, name="record")
+app.add_typer(data.data, name="data")
 app.add_typer(study.study, name="study")
+calibrate.calibrate.command()(calibrate_delay.delay)
+calibrate.calibrate.command()(calibrate_arm.arm)
+app.add_typer(calibrate.calibrate, name="calibrate")
+app.add_typer(lab.lab, name="lab")
 
 
 @app.callback()

@@ -19,7 +19,7 @@ from marl_airhockey.toolkit.trust import Trust
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
-    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.algorithms import AnyConfig
     from marl_airhockey.learn.grade import Metrics
 
 app = typer.Typer(
@@ -37,7 +37,10 @@ Scenario = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Backend = Annotated[str, typer.Option(help="Physics.")]
-Profile = Annotated[str, typer.Option(help="ideal, or a robot's: ur5e, gantry.")]
+Profile = Annotated[
+    str,
+    typer.Option(help="ideal, a robot's (ur5e, gantry), or a file: airhockey fit."),
+]
 Options = Annotated[
     list[str] | None,
     typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
@@ -138,7 +141,7 @@ def bar() -> Progress:
     )
 
 
-def train_with_progress(config: TrainConfig | None, folder: Path) -> Metrics:
+def train_with_progress(config: AnyConfig | None, folder: Path) -> Metrics:
     """Call `learn.train.train` with a progress bar."""
     from marl_airhockey.learn.train import train
 

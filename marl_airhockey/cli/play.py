@@ -1,4 +1,4 @@
-"""Commands ``airhockey play`` and ``airhockey record report``."""
+"""Command ``airhockey play``."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ import contextlib
 import socket
 import threading
 import webbrowser
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from marl_airhockey.cli.options import (
-    AsJson,
     Backend,
     Options,
     Profile,
@@ -21,6 +20,7 @@ from marl_airhockey.cli.options import (
     console,
     settings,
 )
+from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, Handicap
 from marl_airhockey.registry import DEFAULT_BACKEND
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
     from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.server import AccessCheck
+    from marl_airhockey.play.session import Plant
 
 Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
 Port = Annotated[int, typer.Option(help="0 for a free one.", min=0, max=65535)]
@@ -83,15 +84,15 @@ def play(
     host: Host = "127.0.0.1",
     port: Port = 8480,
     browser: Browser = True,
+    lab: LabOption = False,
+    rig: RigOption = None,
     trust: Trusting = False,
 ) -> None:
     """Play against a policy, a script or each other in the browser."""
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.live_match import LiveMatch
-    from marl_airhockey.play.recorder import Recorder
-    from marl_airhockey.play.server import application
-    from marl_airhockey.play.session import Session
+    from marl_airhockey.play.real_match import RealMatch
 
     keywords: Keywords = {
         "backend": backend,
@@ -99,21 +100,77 @@ def play(
         "options": settings(option),
     }
     handicap = Handicap(reaction / 1000.0, noise, pace)
-    match = LiveMatch(scenario, {}, keywords, handicap)
-    _seat_drivers(match, opponent, settings(seat))
-    with console.status("preparing the table (longer when it is the first time)"):
-        match.warm_up()
-    session = Session(match, Recorder(record) if record else None)
-    host_table(
-        lambda access: application(session, access), scenario, host, port, browser
-    )
+    with real_table(keywords, lab, rig) as table:
+        kind = RealMatch if backend == REAL else LiveMatch
+        match = kind(scenario, {}, table, handicap)
+        seat_drivers(match, opponent, settings(seat))
+        with console.status("preparing the table (longer when it is the first time)"):
+            match.warm_up()
+        host_match(match, record, host, port, browser)
+
+
+def host_match(
+    match: LiveMatch,
+    record: Path | None,
+    host: str,
+    port: int,
+    browser: bool,
+    film: bool = False,
+) -> None:
+    """Serve a match until interrupted; of one in the virtual lab, with its faults.
+
+    Args:
+        match: to serve.
+        record: folder for its recordings; None for none.
+        host: see `host_table`.
+        port: see `host_table`.
+        browser: see `host_table`.
+        film: whether to keep a real table's pictures beside the recordings.
+    """
+    from marl_airhockey.play.real_match import RealMatch
+    from marl_airhockey.play.recorder import Recorder
+    from marl_airhockey.play.server import application
+    from marl_airhockey.play.session import Session
+
+    filmed = match.backend.camera if film and isinstance(match, RealMatch) else None
+    session = Session(match, Recorder(record, filmed) if record else None)
+    with contextlib.ExitStack() as stack:
+        if isinstance(match, RealMatch):
+            session.plant = stack.enter_context(lab_plant(match.backend.rig.operator))
+        name = match.world.scenario.name
+        host_table(
+            lambda access: application(session, access), name, host, port, browser
+        )
     if session.failure is not None:
         raise session.failure
 
 
-def _seat_drivers(
-    match: LiveMatch, opponent: str | None, seats: dict[str, Any]
-) -> None:
+@contextlib.contextmanager
+def lab_plant(operator: str) -> Iterator[Plant]:
+    """Give the faults of the virtual lab that a rig's operator names; none elsewhere.
+
+    Args:
+        operator: see `rig.Rig.operator`.
+    """
+    from marl_airhockey.lab.faults import FAULTS
+    from marl_airhockey.lab.lab import LabClient
+    from marl_airhockey.play.session import Plant
+
+    kind, _, port = operator.partition(":")
+    if kind != "lab":
+        yield Plant()
+        return
+    client = LabClient(int(port))
+
+    def switch(name: str, on: bool) -> None:
+        with contextlib.suppress(RuntimeError):
+            client.ask("fault", name=name, on=on)
+
+    yield Plant(FAULTS, switch)
+    client.close()
+
+
+def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) -> None:
     """Give each seat to its driver: a person at the first, opponents elsewhere.
 
     Args:
@@ -142,38 +199,6 @@ def show(recording: Path, host: str, port: int, browser: bool) -> None:
 
     name = recording.name
     host_table(lambda access: replay(recording, access), name, host, port, browser)
-
-
-def report(
-    folder: Annotated[Path, typer.Argument(help="Of recordings.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of the report; the recordings' own.")
-    ] = None,
-    scenario: Annotated[
-        str | None, typer.Option("--scenario", "-s", help="Of this one alone.")
-    ] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Summarize recordings: results, reactions, shots, limits, a study's answers."""
-    require("matplotlib", "train")
-    from marl_airhockey.play.plots import plot_report
-    from marl_airhockey.play.report import summarize
-    from marl_airhockey.study.answers import read_answers
-
-    found, answers = summarize(folder, scenario), read_answers(folder)
-    files = found.save(out or folder)
-    plot = (out or folder) / "report.png"
-    plot_report(found, plot)
-    files.append(plot)
-    if answers.participants:
-        files += answers.save(out or folder)
-    if as_json:
-        console.print_json(files[0].read_text())
-        return
-    for path in files:
-        if path.suffix == ".md":
-            console.print(path.read_text(), markup=False, soft_wrap=True)
-    console.print("files:", *files, soft_wrap=True)
 
 
 def host_table(

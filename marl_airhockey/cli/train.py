@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -15,7 +15,6 @@ from marl_airhockey.cli.options import (
     Drivers,
     Options,
     Physics,
-    Profile,
     Trusting,
     Workers,
     app,
@@ -30,6 +29,7 @@ from marl_airhockey.core.physics import load_physics
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario
 
 if TYPE_CHECKING:
+    from marl_airhockey.learn.algorithms import AnyConfig
     from marl_airhockey.learn.config import TrainConfig
 
 
@@ -38,8 +38,12 @@ def train(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
     seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
-    steps: Annotated[int | None, typer.Option(help="Steps of single worlds.")] = None,
+    profile: Annotated[
+        str | None, typer.Option(help="What robots sense: ideal, ur5e, gantry.")
+    ] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Steps of single worlds; of the gradient.")
+    ] = None,
     hidden: Annotated[
         int | None, typer.Option(help="Units of both layers; the paper's size is 256.")
     ] = None,
@@ -53,6 +57,13 @@ def train(
     init: Annotated[
         Path | None, typer.Option(help="Begin with the weights of this run.")
     ] = None,
+    algo: Annotated[
+        str, typer.Option(help="ppo; sac_her; bc and iql learn from --data.")
+    ] = "ppo",
+    data: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recordings to learn from, or a folder of them; repeatable."),
+    ] = None,
     change: Annotated[
         list[str] | None,
         typer.Option("--set", help="A setting of the preset, NAME=VALUE; repeatable."),
@@ -65,8 +76,9 @@ def train(
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Train a policy with PPO and its preset; SCENARIO or --resume is needed."""
-    from marl_airhockey.learn.config import load_config, preset
+    """Train a policy with PPO and its preset, or by another --algo; or --resume."""
+    from marl_airhockey.learn.algorithms import PPO, load_any_config, make_config
+    from marl_airhockey.learn.config import TrainConfig
 
     given = {
         "physics": load_physics(physics) if physics is not None else None,
@@ -78,35 +90,48 @@ def train(
     }
     given = {name: value for name, value in given.items() if value is not None}
     if resume is not None:
-        if given or any((scenario, change, option, other, out)):
+        if given or any((scenario, change, option, other, out, data, profile)):
             raise ValueError("--resume goes on as the run was begun: give nothing else")
-        config = load_config(resume / "config.toml")
-        _train(None, resume, config.scenario, as_json)
+        _train(None, resume, load_any_config(resume).scenario, as_json)
         return
-    if not scenario:
-        raise ValueError("say which SCENARIO to train, or --resume RUN")
-    changes = settings(change) | {
-        "seed": seed,
-        "backend": backend,
+    shared = {
         "profile": profile,
         "options": settings(option),
         "drivers": settings(other),
-        **given,
     }
-    config = preset(scenario, changes)
-    if steps is not None and not as_json:
-        del changes["total_steps"]
-        updates, usual = -(-steps // config.rollout), preset(scenario, changes)
-        console.print(
-            f"steps: {updates * config.rollout:,}, {updates} updates of "
-            f"{config.rollout:,}; the preset has {usual.total_steps:,}"
-        )
-    folder = out or Path("runs") / f"{find_scenario(scenario).name}-{seed}"
-    _train(config, folder, scenario, as_json)
+    changes = {name: value for name, value in shared.items() if value}
+    changes |= settings(change) | {"seed": seed, "backend": backend} | given
+    config = make_config(algo, scenario, data or [], changes)
+    if isinstance(config, TrainConfig) and steps is not None and not as_json:
+        _tell_updates(steps, config, changes)
+    kind = "" if algo == PPO else f"{algo}-"
+    name = find_scenario(config.scenario).name
+    _train(
+        config,
+        out or Path("runs") / f"{name}-{kind}{config.seed}",
+        scenario or config.scenario,
+        as_json,
+    )
+
+
+def _tell_updates(steps: int, config: TrainConfig, changes: dict[str, Any]) -> None:
+    """Print how many updates a number of steps is, and what is usual."""
+    from marl_airhockey.learn.config import preset
+
+    others = {name: value for name, value in changes.items() if name != "total_steps"}
+    usual = preset(config.scenario, others)
+    updates = -(-steps // config.rollout)
+    console.print(
+        f"steps: {updates * config.rollout:,}, {updates} updates of "
+        f"{config.rollout:,}; the preset has {usual.total_steps:,}"
+    )
 
 
 def _train(
-    config: TrainConfig | None, folder: Path, scenario: str, as_json: bool
+    config: AnyConfig | None,
+    folder: Path,
+    scenario: str,
+    as_json: bool,
 ) -> None:
     """Train, or resume a run for None, and print the result."""
     row = train_with_progress(config, folder)
@@ -165,7 +190,7 @@ def demo(
         results, files = run_demo(scenario, out, steps, report)
     console.print(result_table(results))
     for what, path in files.items():
-        console.print(f"{what:>16}: {path}")
+        console.print(f"{what:>16}: {path}", soft_wrap=True)
     console.print(
         "\ntry next:\n"
         f"  airhockey watch {out / 'run'} --scenario {scenario}\n"

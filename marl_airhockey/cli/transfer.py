@@ -24,7 +24,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.physics import load_physics
-from marl_airhockey.core.profiles import PROFILES
+from marl_airhockey.core.profiles import PROFILES, find_profile
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend, find_scenario, make_agent
 from marl_airhockey.toolkit.trust import require_trust
@@ -160,8 +160,7 @@ def _check_names(backends: list[str], profiles: list[str]) -> None:
     for backend in backends:
         find_backend(backend)
     for profile in profiles:
-        if profile not in PROFILES:
-            raise ValueError(unknown_name("profile", profile, PROFILES))
+        find_profile(profile)
 
 
 def _list(names: str) -> list[str]:
@@ -218,19 +217,33 @@ def fit(
     origin: Annotated[
         str, typer.Option(help="Of the rows: centre, or corner (of least x and y).")
     ] = "centre",
-    out: Annotated[Path, typer.Option(help="The preset.")] = Path("fit.toml"),
+    base: Annotated[
+        str | None,
+        typer.Option(
+            help="Of rows: write a profile for --profile, with the rest of this one."
+        ),
+    ] = None,
+    delays: Annotated[
+        list[Path] | None,
+        typer.Option(help="Of --base: what calibrate delay (arm) --json has printed."),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="The file.")] = Path("fit.toml"),
 ) -> None:
     """Fit the 2D table's physics to play on another one, for --physics FILE."""
     if scenario.endswith(".csv"):
-        _fit_rows([Path(scenario), *(more or [])], table, origin, out)
+        paths = [Path(scenario), *(more or [])]
+        _fit_rows(paths, table, origin, out, base, delays)
         return
+    if base is not None or delays:
+        raise ValueError("--base, --delays: they go with rows t,x,y of a table")
     if more:
         raise ValueError(f"fit: {more[0]} follows a scenario; files must end in .csv")
+    from marl_airhockey.core.recording import SUFFIX
     from marl_airhockey.transfer.recorded_play import load_recordings, record_play
     from marl_airhockey.transfer.system_id import fit_physics
 
     if recordings is not None:
-        seen = load_recordings(sorted(recordings.glob("*.jsonl")))
+        seen = load_recordings(sorted(recordings.glob(f"*{SUFFIX}")))
     else:
         player = make_agent(driver or f"zoo/{scenario}")
         there = load_physics(physics) if physics else {}
@@ -254,18 +267,35 @@ def fit(
     )
 
 
-def _fit_rows(paths: list[Path], table: str, origin: str, out: Path) -> None:
+def _fit_rows(
+    paths: list[Path],
+    table: str,
+    origin: str,
+    out: Path,
+    base: str | None,
+    delays: list[Path] | None,
+) -> None:
     """Fit a table's laws to files of rows, write them and print them."""
-    from marl_airhockey.transfer.table_fit import fit_table
+    from marl_airhockey.transfer.corrected_fit import fit_corrected
+    from marl_airhockey.transfer.profile_file import profile_toml, read_delays
     from marl_airhockey.transfer.track import read_track
 
     if table not in TABLES:
         raise ValueError(unknown_name("table", table, TABLES))
+    if base is not None and base not in PROFILES:
+        raise ValueError(f"--base: {unknown_name('profile', base, PROFILES)}")
+    if delays and base is None:
+        raise ValueError("--delays: add --base, the profile that has the rest")
+    measured = read_delays(delays) if delays else None
     with console.status("fitting"):
         tracks = [read_track(path, TABLES[table], origin) for path in paths]
-        found = fit_table(tracks, TABLES[table])
+        found = fit_corrected(tracks, TABLES[table])
+    count = sum(len(track.time) for track in tracks)
+    what = f"{table}, fitted to {count} rows of play"
     out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(found.to_toml())
+    out.write_text(
+        found.to_toml() if base is None else profile_toml(found, base, measured, what)
+    )
     shown = Table("", "fitted", "95 % interval", "flights or bounces", title=table)
     rows = [(f"{n}, {PARAMETERS[n].unit}", e) for n, e in found.found.items()]
     rows += [(f"wall_restitution, side {k}", e) for k, e in found.by_side.items()]

@@ -20,6 +20,13 @@ from marl_airhockey.cli.options import (
     environment,
     scenario_for,
 )
+from marl_airhockey.cli.real_table import (
+    LabOption,
+    RigOption,
+    name_on_table,
+    real_table,
+)
+from marl_airhockey.core.recording import SUFFIX
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 
@@ -44,6 +51,8 @@ def watch(
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 0,
     browser: cli_play.Browser = True,
+    lab: LabOption = False,
+    rig: RigOption = None,
     trust: Trusting = False,
 ) -> None:
     """Watch a driver play, in a window or as a video; or a recording of play.
@@ -52,18 +61,19 @@ def watch(
     """
     from marl_airhockey.evaluation.watch import show_episodes
 
-    if driver.endswith(".jsonl"):
+    if driver.endswith(SUFFIX):
         if video is None:
             cli_play.show(Path(driver), host, port, browser)
         else:
             watch_recording(Path(driver), video)
         return
-    if any(Path(driver).glob("*.jsonl")):
-        raise ValueError(f"{driver}: holds recordings; name one of its .jsonl files")
+    if any(Path(driver).glob(f"*{SUFFIX}")):
+        raise ValueError(f"{driver}: holds recordings; name one of its {SUFFIX} files")
     keywords = environment(backend, profile, option, other)
-    player = make_agent(driver)
+    player = make_agent(name_on_table(driver, backend))
     game = scenario_for(player, scenario)
-    show_episodes(game, player, keywords, seed, episodes, video, camera=camera)
+    with real_table(keywords, lab, rig) as table:
+        show_episodes(game, player, table, seed, episodes, video, camera=camera)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 

@@ -20,12 +20,16 @@ class Client:
         self.consent: str | None = None
         """Version of the texts that the person has agreed to, in a study."""
         self.seat: int | None = None
+        self.watches = False
+        """True for a page that may watch and nothing else."""
         self.acknowledged = 0
         """Number of the last aim that a control step has used."""
         self.round_trip: float | None = None
         """Time from an aim to the frame that shows it, ms, as measured by the page."""
         self.last_input = time.monotonic()
         """Time of the last movement, s."""
+        self.last_held = float("-inf")
+        """Time of the last aim by a pointer that is held, s."""
         self.pointer = (0.0, 0.0)
         """Last aim, table frame, m."""
         self.limiter = RateLimiter(self.last_input)

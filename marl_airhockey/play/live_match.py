@@ -6,10 +6,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from marl_airhockey.core.blocks import Columns
 from marl_airhockey.core.seat import Seat
+from marl_airhockey.data.columns import first_columns
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
-from marl_airhockey.play.messages import description, world_state
+from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.step_result import StepResult
 
@@ -19,7 +21,7 @@ COUNTDOWN = 3.0
 """Time from the start of a match to its first step, s."""
 RESUME = 1.5
 """Shortest countdown after a pause, s."""
-Phase = Literal["lobby", "countdown", "play", "pause", "done"]
+Phase = Literal["lobby", "arrange", "countdown", "play", "pause", "done"]
 
 
 class LiveMatch:
@@ -36,6 +38,9 @@ class LiveMatch:
         ValueError: an unknown scenario, agent or driver.
     """
 
+    CONTROL_DT = 1 / RATE
+    """s, unless the keywords say otherwise"""
+
     def __init__(
         self,
         scenario: str,
@@ -44,7 +49,7 @@ class LiveMatch:
         handicap: Handicap | None = None,
         seed: int | None = None,
     ) -> None:
-        usual: Keywords = {"control_dt": 1 / RATE}
+        usual: Keywords = {"control_dt": self.CONTROL_DT}
         self.keywords: Keywords = {**usual, **keywords}
         self.world = build_world(scenario, 1, autoreset=False, keywords=self.keywords)
         agents = [f"paddle_{i}" for i in range(len(self.seats))]
@@ -70,12 +75,12 @@ class LiveMatch:
         """Rows ["goal", goal line, puck] and ["hit", paddle, puck] of the last tick."""
         self.result: StepResult | None = None
         """Result of the last control step of this episode; None before the first."""
-        self.first_state: dict[str, Any] = {}
-        """Value of `state()` before the first step of this episode."""
+        self.first: Columns = {}
+        """Columns (1, ...) of a recording before the first step of this episode."""
         table = self.world.scene.table
         self._rotations = [table.rotation(seat.side) for seat in self.seats]
-        self.world.reset(seed)
-        self._begin_episode()
+        self.world.seed(seed)
+        self._next_episode()
         for agent, name in drivers.items():
             self.set_driver(agents.index(agent), name)
 
@@ -99,8 +104,7 @@ class LiveMatch:
             raise ValueError("seats change between matches")
         self.drivers.set(i, name)
         if self.phase == "done":
-            self.world.reset()
-            self._begin_episode()
+            self._next_episode()
             self.phase, self.reason = "lobby", ""
         else:
             self.drivers.reset([i])
@@ -127,9 +131,9 @@ class LiveMatch:
         """Play half a second and reset, so that all loops are compiled by then."""
         for _ in range(RATE // 2):
             self._step()
-        self.world.reset(int(self.world.seeds[0]))
+        self.world.seed(int(self.world.seeds[0]))
         self.phase, self.number = "lobby", 0
-        self._begin_episode()
+        self._next_episode()
 
     def start(self) -> None:
         """Begin a match, or resume a paused one, with a countdown."""
@@ -137,8 +141,7 @@ class LiveMatch:
             self.phase, self.time_left = "countdown", max(self.time_left, RESUME)
         elif self.phase in ("lobby", "done"):
             if self.phase == "done":
-                self.world.reset()
-                self._begin_episode()
+                self._next_episode()
             self.phase, self.time_left = "countdown", COUNTDOWN
         self.reason = ""
 
@@ -171,7 +174,7 @@ class LiveMatch:
         self.world.close()
 
     def state(self) -> dict[str, Any]:
-        """Return what a page draws: `messages.world_state`, with phase and clock.
+        """Return what a page draws: `messages.drawn`, with phase and clock.
 
         ``n`` counts the steps of the episode; ``time_left`` is that of a countdown, s.
         """
@@ -179,21 +182,37 @@ class LiveMatch:
             "phase": self.phase,
             "n": self.ticks,
             "time_left": round(self.time_left, 2),
-            **world_state(self.world),
+            **self._drawn(),
             "reason": self.reason,
             "events": self.events,
         }
 
+    def _drawn(self) -> dict[str, Any]:
+        world, episode = self.world, self.world.episode
+        return drawn(
+            world.scenario,
+            world.state.map(lambda x: x[0]),
+            {name: value[0] for name, value in world.memory.items()},
+            episode.returns[0],
+            episode.success[0],
+        )
+
     def describe(self) -> dict[str, Any]:
         """Return what never changes in a match: `messages.description`."""
-        return description(self.world)
+        world = self.world
+        return description(world.scenario, world.max_cycles * world.control_dt)
+
+    def _next_episode(self) -> None:
+        """Let the world begin an episode."""
+        self.world.reset()
+        self._begin_episode()
 
     def _begin_episode(self) -> None:
         """Reset counters and drivers after a reset of the world."""
         self.ticks, self.pauses, self.result, self.events = 0, 0, None, []
         self.number += 1
         self.drivers.reset(range(len(self.seats)))
-        self.first_state = self.state()
+        self.first = first_columns(self.world)
 
     def _step(self) -> None:
         """Make one control step of the world and note its events."""
@@ -201,12 +220,8 @@ class LiveMatch:
         actions = np.zeros((1, len(self.seats), 2))
         for i in range(len(self.seats)):
             actions[:, i] = self.drivers.action(i)
-        self.result = world.step(actions)
+        self.result = world.step(actions, self.drivers.prescribed())
         self.ticks += 1
-        state = world.state
-        for puck, goal_line in np.argwhere(state.crossed[0]).tolist():
-            self.events.append(["goal", goal_line, puck])
-        for paddle, puck in np.argwhere(state.touched[0] > 0).tolist():
-            self.events.append(["hit", paddle, puck])
+        self.events = events(world.state.map(lambda x: x[0]))
         if self.result.terminated[0] or self.result.truncated[0]:
             self.phase, self.reason = "done", ""

@@ -11,13 +11,15 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.registry import (
     ZOO,
-    agent_names,
     make_agent,
     make_scenario,
+    plain_agent_names,
     zoo_names,
 )
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.pointing import ARM_LAG
 from marl_airhockey.types import Array
+from marl_airhockey.world.build import refuse_erratic
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.world import World
 
@@ -42,14 +44,18 @@ class MatchDrivers:
         self.names = [PERSON for _ in seats]
         """Name or path of the driver of each seat."""
         self._device_kinds = ["mouse" for _ in seats]
-        self._devices: list[Driver] = [make_agent("mouse") for _ in seats]
+        lag = ARM_LAG if world.backend.realtime else 0.0
+        self._by_kind = {"mouse": f"mouse:lag={lag}", "gamepad": "gamepad"}
+        self._devices = [make_agent(self._by_kind["mouse"]) for _ in seats]
         self._driven = [self._build(i) for i in range(len(seats))]
 
     @property
     def choices(self) -> list[str]:
         """Names of programs to choose from: fitting policies, then scripts."""
-        hidden = (*INPUT_DEVICES, "policy", "reacher")
-        scripts = [name for name in agent_names() if name not in hidden]
+        hidden = (*INPUT_DEVICES, "reacher")
+        scripts = [name for name in plain_agent_names() if name not in hidden]
+        if self._world.backend.realtime:
+            scripts = [name for name in scripts if not make_agent(name).erratic]
         if len(self.names) > 1:
             scripts += [
                 f"{name}:strength={strength}"
@@ -60,7 +66,7 @@ class MatchDrivers:
 
     @cached_property
     def fitting_policies(self) -> list[str]:
-        """Policies of the zoo for this game: same rules, seats and observations.
+        """Policies of the zoo for this game: same rules, table, seats, observations.
 
         Those that were trained in the same profile come first.
         """
@@ -72,8 +78,9 @@ class MatchDrivers:
             # compiled.
             if card["scenario"] != scenario.name:
                 continue
-            seats = make_scenario(card["scenario"], **card["options"]).seats
-            if seats == scenario.seats and card["labels"] == list(
+            own = make_scenario(card["scenario"], **card["options"])
+            same = own.seats == scenario.seats and own.table == scenario.table
+            if same and card["labels"] == list(
                 observer.prepare(card["observe"]).labels
             ):
                 found.append((card["profile"] != self._profile, name))
@@ -101,10 +108,15 @@ class MatchDrivers:
     def input_device(self, i: int, kind: str) -> Driver:
         """Return the driver by which a person steers a seat: "mouse" or "gamepad"."""
         if self.names[i] == PERSON and self._device_kinds[i] != kind:
-            self._device_kinds[i], self._devices[i] = kind, make_agent(kind)
+            self._device_kinds[i] = kind
+            self._devices[i] = make_agent(self._by_kind[kind])
             self._driven[i] = self._build(i)
             self.reset([i])
         return self._devices[i]
+
+    def kind_of_device(self, i: int) -> str:
+        """Return by what a person steers a seat: "mouse" or "gamepad"."""
+        return self._device_kinds[i]
 
     def reset(self, seats: Iterable[int]) -> None:
         """Begin an episode for the drivers of some seats."""
@@ -113,11 +125,32 @@ class MatchDrivers:
             self._driven[i].reset(one, world.seeds, world.episode.number)
 
     def action(self, i: int) -> Array:
-        """Return the action of a seat, (1, 2) fractions of top speed, ego frame."""
+        """Return the action of a seat, (1, 2) fractions of top speed, ego frame.
+
+        Of one that prescribes it is 0.
+        """
         world = self._world
+        if self._driven[i].measured() is not None:
+            return np.zeros((1, 2))
         return self._driven[i].act(
             world.sensed, world.memory, world.episode.physics, world.episode.cycles
         )
+
+    def prescribed(self) -> Array | None:
+        """Return (1, seats, 4) where led paddles are, nan for those that ask.
+
+        None if all ask.
+        """
+        places = [seat.measured() for seat in self._driven]
+        if all(place is None for place in places):
+            return None
+        asks = np.full((1, 4), np.nan)
+        return np.stack([asks if place is None else place for place in places], 1)
+
+    @property
+    def troubles(self) -> list[str]:
+        """Reason why a led paddle rests, by seat; "" for none."""
+        return [seat.driver.trouble for seat in self._driven]
 
     def close(self) -> None:
         """Leave all drivers."""
@@ -129,5 +162,7 @@ class MatchDrivers:
         name, world = self.names[i], self._world
         driver = self._devices[i]
         if name != PERSON:
-            driver = self.handicap.apply(make_agent(name))
+            driver = make_agent(name)
+            refuse_erratic(f"paddle_{i}", driver, world.backend.realtime)
+            driver = driver if driver.led else self.handicap.apply(driver)
         return DrivenSeat(i, driver, world.observer, 1, world.control_dt)

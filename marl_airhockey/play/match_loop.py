@@ -10,10 +10,13 @@ from typing import Any
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.handicap import PRESETS
 from marl_airhockey.play.live_match import RATE, LiveMatch
+from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.recorder import Recorder
 
 BEHIND = 6
 """Ticks that the loop makes up for when it is late; more are skipped."""
+ASIDE = 0.1
+"""Time after which pages get a frame even if a real table is not yet ready, s."""
 
 
 class MatchLoop:
@@ -51,7 +54,10 @@ class MatchLoop:
         due = time.perf_counter()
         mark, count = due, 0
         while True:
-            self.tick()
+            if isinstance(self.match, RealMatch):
+                await self._tick_aside(self.match)
+            else:
+                self.tick()
             count += 1
             due += 1 / RATE
             now = time.perf_counter()
@@ -64,7 +70,19 @@ class MatchLoop:
 
     def tick(self) -> None:
         """Advance the match by a tick, record it and send it to all pages."""
-        moved = self.match.tick()
+        self._share(self.match.tick())
+
+    async def _tick_aside(self, match: RealMatch) -> None:
+        """Advance a match on a real table, in a thread, as that takes its time."""
+        match.watched = bool(self.clients)
+        self._check_hands(time.monotonic())
+        ticking = asyncio.ensure_future(asyncio.to_thread(match.tick))
+        while not (await asyncio.wait({ticking}, timeout=ASIDE))[0]:
+            self._broadcast()
+        self._share(ticking.result())
+
+    def _share(self, moved: bool) -> None:
+        """Record a tick and send it to all pages."""
         if self.recorder is not None:
             self._record(self.recorder, moved)
         if self.clients:
@@ -114,11 +132,16 @@ class MatchLoop:
                 for p in self.players
             ],
             "handicap": presets.get(handicap, handicap.caption),
+            "troubles": [*self.match.drivers.troubles, *self._film_troubles()],
             "watching": sum(client.seat is None for client in self.clients),
             "rate": round(self.rate, 1),
             "recording": self.recorder is not None
             and self.match.phase in ("countdown", "play", "pause"),
         }
+
+    def _film_troubles(self) -> list[str]:
+        """Return what is missing in the video that is being written."""
+        return [self.recorder.trouble] if self.recorder is not None else []
 
     def _own_fields(self, client: Client) -> dict[str, Any]:
         """Return what one page alone gets."""
@@ -126,3 +149,6 @@ class MatchLoop:
 
     def _check_presence(self, now: float) -> None:
         """Handle pages that are idle or gone; called once a second."""
+
+    def _check_hands(self, now: float) -> None:
+        """Let the arm rest that nobody holds; called at every tick of a real table."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from marl_airhockey.core.limits import VIOLATIONS
+from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
 MOVING = 0.1
@@ -50,37 +51,34 @@ class Player:
 
 
 def measure(
-    player: Player,
-    i: int,
-    seat: dict[str, Any],
-    meta: dict[str, Any],
-    steps: list[dict[str, Any]],
+    player: Player, i: int, scene: Scene, episode: RecordedEpisode, dt: float
 ) -> None:
     """Add the measurements of an episode to a player.
 
     Args:
         player: is changed.
         i: index of the player's seat.
-        seat: its description in the meta line.
-        meta: the meta line of the recording.
-        steps: its steps.
+        scene: in which it was.
+        episode: as it was recorded.
+        dt: duration of a step, s.
     """
+    columns, bodies, table = episode.columns, scene.bodies, scene.table
     bound = [VIOLATIONS.index(name) for name in ("speed", "acceleration", "reach")]
-    for row in steps:
-        player.steps += 1
-        player.limited += any(row["violation"][i][k] > 0 for k in bound)
-        if row["delays"][i] is not None:
-            player.delays.append(row["delays"][i])
-    if not steps or not steps[0]["pucks"]:
+    player.steps += len(episode)
+    player.limited += int((columns["violation"][:, i, bound] > 0).any(-1).sum())
+    if "round_trip" in columns:
+        trips = columns["round_trip"][:, i]
+        player.delays += trips[np.isfinite(trips)].tolist()
+    if not bodies.pucks:
         return
-    match, rotation = meta["match"], np.array(seat["rotation"])
-    pucks = np.array([row["pucks"] for row in steps])
-    position, velocity = pucks[..., :2] @ rotation.T, pucks[..., 2:] @ rotation.T
-    speed = np.hypot(*np.array([row["paddle_velocities"][i] for row in steps]).T)
-    corners = np.array(match["table"]) @ rotation.T
-    end, half = corners[:, 0].max(), corners[:, 1].max() - match["puck_radius"]
-    for k in range(pucks.shape[1]):
-        hits = np.array([["hit", i, k] in row["events"] for row in steps])
+    rotation = table.rotation(scene.seats[i].side)
+    position = columns["state.position"][:, bodies.puck] @ rotation.T
+    velocity = columns["state.velocity"][:, bodies.puck] @ rotation.T
+    speed = np.hypot(*columns["state.velocity"][:, i].T)
+    corners = np.asarray(table.vertices) @ rotation.T
+    end, half = corners[:, 0].max(), corners[:, 1].max() - table.puck_radius
+    for k in range(bodies.pucks):
+        hits = columns["state.touched"][:, i, k] > 0
         player.interceptions += interceptions(position[:, k], velocity[:, k], hits)
         for n in np.flatnonzero(hits & (velocity[:, k, 0] > INCOMING)):
             x, y = position[n, k]
@@ -89,7 +87,6 @@ def measure(
             offset = y + vy * (end - x) / vx
             folded = half - abs((offset + half) % (4 * half) - 2 * half)
             player.shot_placements.append(float(folded))
-        dt = meta["control_dt"]
         player.reactions += reactions(position[:, k], velocity[:, k], speed, dt)
 
 

@@ -1,4 +1,4 @@
-"""Contents of the messages that a page and a recording get about a world.
+"""Contents of the messages that a page gets about a world.
 
 All values are JSON; lengths are in metres, positions in the table frame, numbers
 rounded to four decimals.
@@ -10,21 +10,29 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
 from marl_airhockey.envs.describe import what
-from marl_airhockey.registry import make_agent
-from marl_airhockey.types import Array
-from marl_airhockey.world.world import World
+from marl_airhockey.toolkit.pointing import BRAKE, GAIN
+from marl_airhockey.types import Array, Memory
 
 
-def world_state(world: World) -> dict[str, Any]:
-    """Return all that a page draws of the first world of a batch.
+def drawn(
+    scenario: Scenario, state: State, memory: Memory, returns: Array, success: Array
+) -> dict[str, Any]:
+    """Return all that a page draws of a world.
 
     ``pucks`` are rows x, y, vx, vy; ``marks`` are rows kind, ax, ay, bx, by, radius.
+
+    Args:
+        scenario: what is played.
+        state: without leading axes.
+        memory: of the scenario, without leading axes.
+        returns: (seats,)
+        success: (seats,) bool
     """
-    state = world.state.map(lambda x: x[0])
-    memory = {name: value[0] for name, value in world.memory.items()}
-    retired = world.scenario.retired(memory)
+    retired = scenario.retired(memory)
     return {
         "time": round(float(state.time), 3),
         "paddles": rounded(state.paddle),
@@ -34,22 +42,37 @@ def world_state(world: World) -> dict[str, Any]:
         "angles": rounded(state.angle[state.bodies.block]),
         "marks": [
             [m.kind, *rounded(np.array([*m.start, *m.end, m.radius]))]
-            for m in world.scenario.marks(state, memory)
+            for m in scenario.marks(state, memory)
         ],
-        "caption": world.scenario.caption(memory),
-        "returns": rounded(world.episode.returns[0]),
-        "success": np.flatnonzero(world.episode.success[0]).tolist(),
+        "caption": scenario.caption(memory),
+        "returns": rounded(returns),
+        "success": np.flatnonzero(success).tolist(),
         "retired": [] if retired is None else np.flatnonzero(retired).tolist(),
     }
 
 
-def description(world: World) -> dict[str, Any]:
-    """Return what never changes: the table, its seats, the limits of time and speed."""
-    scene, table = world.scene, world.scene.table
-    mouse: Any = make_agent("mouse")
+def events(state: State) -> list[list[Any]]:
+    """Return rows ["goal", goal line, puck] and ["hit", paddle, puck] of a step.
+
+    Args:
+        state: after it, without leading axes.
+    """
+    goals = [["goal", line, k] for k, line in np.argwhere(state.crossed).tolist()]
+    hits = [["hit", i, k] for i, k in np.argwhere(state.touched > 0).tolist()]
+    return goals + hits
+
+
+def description(scenario: Scenario, seconds: float) -> dict[str, Any]:
+    """Return what never changes: the table, its seats, the limits of time and speed.
+
+    Args:
+        scenario: what is played.
+        seconds: length of an episode.
+    """
+    scene, table = scenario.scene, scenario.scene.table
     return {
-        "scenario": world.scenario.name,
-        "seconds": round(world.max_cycles * world.control_dt, 4),
+        "scenario": scenario.name,
+        "seconds": round(seconds, 4),
         "table": rounded(np.asarray(table.vertices)),
         "normals": rounded(table.normals),
         "paddle_radius": table.paddle_radius,
@@ -71,8 +94,8 @@ def description(world: World) -> dict[str, Any]:
             }
             for seat in scene.seats
         ],
-        "mouse": {"gain": mouse.gain, "brake": mouse.brake},
-        "what": what(world.scenario),
+        "mouse": {"gain": GAIN, "brake": BRAKE},
+        "what": what(scenario),
     }
 
 

@@ -14,7 +14,7 @@ BURST = 480.0
 """Messages that a page may send at once."""
 MESSAGES: dict[str, dict[str, type]] = {
     "hello": {"key": str},
-    "aim": {"x": float, "y": float, "q": int, "rtt": float},
+    "aim": {"x": float, "y": float, "held": int, "q": int, "rtt": float},
     "stick": {"x": float, "y": float, "q": int, "rtt": float},
     "start": {},
     "pause": {},
@@ -24,6 +24,7 @@ MESSAGES: dict[str, dict[str, type]] = {
     "leave": {},
     "opponent": {"seat": int, "name": str},
     "handicap": {"name": str},
+    "fault": {"name": str, "on": int},
     "consent": {"version": str},
     "answer": {"question": str, "value": int},
     "withdraw": {},
@@ -32,7 +33,8 @@ MESSAGES: dict[str, dict[str, type]] = {
 """Kinds of messages (key ``t``) and the types of their fields.
 
 ``x`` and ``y`` are a position in the table frame, m, for ``aim``, and a share of full
-tilt along the axes of the table frame for ``stick``. ``q`` counts the aims of a page;
+tilt along the axes of the table frame for ``stick``. ``held`` is 1 while a button or a
+finger is down: a real arm moves only then. ``q`` counts the aims of a page;
 ``rtt`` is the time, ms, that it measured between an aim and the frame that shows it.
 The last four kinds belong to studies.
 """

@@ -1,28 +1,24 @@
 """Recorder of matches: what it has written survives a kill of the process.
 
-An episode is a file of JSON lines: ``meta`` (with the state before the first step as
-``first_state``), a ``step`` for every control step, and an ``end``. A file without an
-end was cut off.
+An episode is a file of `core.recording`, whose head names the players. The pictures of
+a camera are in a video of the same name beside it.
 """
 
 from __future__ import annotations
 
 import datetime
-import json
-import os
-import platform
 import time
-from importlib import metadata
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
-from marl_airhockey.evaluation.recordings import FORMAT
+import numpy as np
+
+from marl_airhockey.core.blocks import Columns
+from marl_airhockey.core.recording import SUFFIX, RecordingWriter
+from marl_airhockey.data.columns import head_of, notes_of, step_columns
+from marl_airhockey.devices.camera import Camera, Film
+from marl_airhockey.devices.camera.film import SUFFIX as FILM_SUFFIX
 from marl_airhockey.play.live_match import LiveMatch
-from marl_airhockey.play.messages import rounded
-from marl_airhockey.registry import DEFAULT_BACKEND
-
-SYNC = 1.0
-"""Time between two calls of fsync, s."""
 
 
 class Recorder:
@@ -30,23 +26,24 @@ class Recorder:
 
     Args:
         folder: is made if it does not exist.
+        camera: whose pictures are kept, too; None for none.
 
     Raises:
         ValueError: a folder that cannot be made.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, camera: Camera | None = None) -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ValueError(f"--record {folder}: {error.strerror}") from error
-        self._folder = folder
+        self._folder, self._camera = folder, camera
+        self._film: Film | None = None
         self.notes: dict[str, Any] = {}
-        """Value of the key "study" of the meta line."""
-        self._file: TextIO | None = None
+        """Value of the key "study" of the head."""
+        self._writer: RecordingWriter | None = None
         self.path: Path | None = None
         """Path of the last file."""
-        self._synced = 0.0
 
     def begin(self, match: LiveMatch, players: list[dict[str, Any]]) -> Path:
         """Begin a file and return its path.
@@ -57,34 +54,21 @@ class Recorder:
         """
         self.end(match, "cut off")
         now = datetime.datetime.now(datetime.UTC)
-        scenario = match.world.scenario.name
         stamp = now.strftime("%Y%m%d-%H%M%S-%f")
-        path = self.path = self._folder / f"{stamp}-{scenario}.jsonl"
-        self._file = path.open("x")
-        physics = match.world.episode.physics
-        self._write(
-            {
-                "kind": "meta",
-                "format": FORMAT,
-                "began": now.isoformat(),
-                "options": match.keywords.get("options", {}),
-                "backend": match.keywords.get("backend", DEFAULT_BACKEND),
-                "profile": match.keywords.get("profile", "ideal"),
-                "control_dt": match.world.control_dt,
-                "physics": {k: float(v[0]) for k, v in physics.items()},
-                "seed": int(match.world.seeds[0]),
-                "episode": int(match.world.episode.number[0]),
-                "players": players,
-                "handicap": vars(match.drivers.handicap),
-                "versions": {
-                    "marl_airhockey": metadata.version("marl_airhockey"),
-                    "python": platform.python_version(),
-                },
-                "study": self.notes,
-                "match": match.describe(),
-                "first_state": match.first_state,
-            }
-        )
+        name = f"{stamp}-{match.world.scenario.name}{SUFFIX}"
+        path = self.path = self._folder / name
+        head = {
+            **head_of(match.world, match.keywords),
+            "players": players,
+            "handicap": vars(match.drivers.handicap),
+            "study": self.notes,
+        }
+        if self._camera is not None:
+            film = path.with_suffix(FILM_SUFFIX)
+            self._film = Film(self._camera, film)
+            head["film"] = film.name
+        self._writer = RecordingWriter(path, head)
+        self._writer.begin(notes_of(match.world), _only(match.first))
         return path
 
     def step(self, match: LiveMatch, delays: list[float | None]) -> None:
@@ -94,47 +78,43 @@ class Recorder:
             match: that made it.
             delays: round trip of the page at each seat, ms; None for programs.
         """
-        if self._file is None or match.result is None:
+        if self._writer is None or match.result is None:
             return
-        world, terms = match.world, match.result.terms
-        self._write(
-            {
-                "kind": "step",
-                "clock": round(time.time(), 4),
-                **match.state(),
-                "paddle_velocities": rounded(world.state.paddle_velocity[0]),
-                "action": rounded(world.action[0]),
-                "command": rounded(world.command[0]),
-                "terms": {k: rounded(v[0]) for k, v in terms.items()},
-                "violation": rounded(match.result.violation[0]),
-                "delays": delays,
-            }
-        )
-        now = time.monotonic()
-        if now - self._synced > SYNC:
-            os.fsync(self._file.fileno())
-            self._synced = now
+        trips = np.array([np.nan if d is None else d for d in delays])
+        clock = np.array(time.time())
+        row = {**_only(step_columns(match.world)), "round_trip": trips, "clock": clock}
+        row |= self._pictured()
+        self._writer.add(row)
 
     def end(self, match: LiveMatch, reason: str) -> None:
-        """Write the end line and close the file, if one is open."""
-        if self._file is None:
+        """Write how the episode ended and close the file, if one is open."""
+        if self._writer is None:
             return
-        world = match.world
-        self._write(
-            {
-                "kind": "end",
-                "reason": reason,
-                "steps": match.ticks,
-                "returns": rounded(world.episode.returns[0]),
-                "success": world.episode.success[0].tolist(),
-            }
-        )
-        os.fsync(self._file.fileno())
-        self._file.close()
-        self._file = None
+        self._writer.end({"reason": reason, "steps": match.ticks})
+        self._writer.close()
+        self._writer = None
+        if self._film is not None:
+            self._film.close()
+            self._film = None
 
-    def _write(self, row: dict[str, Any]) -> None:
-        assert self._file is not None
-        self._file.write(json.dumps(row, separators=(",", ":")) + "\n")
-        # Handed to the operating system: a killed process loses nothing of it.
-        self._file.flush()
+    @property
+    def trouble(self) -> str:
+        """What is missing in the video that is being written; "" if nothing is."""
+        return self._film.trouble if self._film is not None else ""
+
+    def _pictured(self) -> Columns:
+        """Return the number of the film's newest picture, and when it was taken, s.
+
+        Before the first the number is -1. Times are of the monotonic clock, as that of
+        the state is, ``device.moment``.
+        """
+        if self._film is None:
+            return {}
+        last = self._film.last
+        number, taken = last if last is not None else (-1, float("nan"))
+        return {"frame": np.array(number, np.int64), "frame_taken": np.array(taken)}
+
+
+def _only(columns: Columns) -> Columns:
+    """Return the columns of the only world."""
+    return {name: value[0] for name, value in columns.items()}

@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.evaluation.recordings import head, read
+from marl_airhockey.core.recording import (
+    SUFFIX,
+    RecordedEpisode,
+    read_head,
+    read_recording,
+)
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.data.columns import scenario_of
 from marl_airhockey.evaluation.stats import bootstrap, elo, interval, iqm
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.measures import MOVING, Player, measure
@@ -20,8 +27,6 @@ COMPLETE = "played to the end"
 """Reason in the end line of a game that was not broken off."""
 RESAMPLES = 400
 """Bootstrap resamples of an interval."""
-OTHER_FILES = ("diary.jsonl", "erased.jsonl")
-"""Files of a study that are no recordings."""
 FEWEST = 5
 """Games from which an Elo has an interval: fewer have too often all the same result."""
 
@@ -142,48 +147,50 @@ def summarize(folder: Path, scenario: str | None = None) -> Report:
     if not folder.is_dir():
         raise ValueError(f"{folder}: there is no such folder")
     recordings = [
-        read(path)
-        for path in sorted(folder.rglob("*.jsonl"))
-        if path.name not in OTHER_FILES
-        and not head(path).get("study", {}).get("practice")
+        read_recording(path)
+        for path in sorted(folder.rglob(f"*{SUFFIX}"))
+        if not read_head(path).get("study", {}).get("practice")
     ]
-    games = sorted({meta["match"]["scenario"] for meta, _, _ in recordings})
+    games = sorted({recording.head["scenario"] for recording in recordings})
     if scenario is None and len(games) > 1:
         raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
-    wanted = [r for r in recordings if scenario in (None, r[0]["match"]["scenario"])]
+    wanted = [r for r in recordings if scenario in (None, r.head["scenario"])]
     if not wanted:
         what = f" of {scenario}" if scenario else ""
-        raise ValueError(f"{folder}: there are no recordings{what} (*.jsonl) in it")
-    found = Report({}, [], len(wanted), 0)
-    for meta, steps, end in wanted:
-        _add(found, meta, steps, end)
+        raise ValueError(f"{folder}: there are no recordings{what} (*{SUFFIX}) in it")
+    found = Report({}, [], 0, 0)
+    for recording in wanted:
+        scene = scenario_of(recording).scene
+        for episode in recording.episodes:
+            _add(found, recording.head, scene, episode)
     return found
 
 
 def _add(
-    found: Report,
-    meta: dict[str, Any],
-    steps: list[dict[str, Any]],
-    end: dict[str, Any],
+    found: Report, head: dict[str, Any], scene: Scene, episode: RecordedEpisode
 ) -> None:
     """Add an episode to a report."""
-    seats, players = meta["match"]["seats"], []
-    for row in meta["players"]:
-        name = row["person"] or _program(row["driver"], meta["handicap"])
+    players, handicap = [], head.get("handicap")
+    for row in head["players"]:
+        name = row["person"] or _program(row["driver"], handicap)
         known = found.players.setdefault(name, Player(name, row["person"] is not None))
         players.append(known)
-    complete = end.get("reason") == COMPLETE
+    complete = episode.end.get("reason") == COMPLETE
+    found.episodes += 1
     found.broken_off += not complete
-    teams = [seat["team"] for seat in seats]
+    teams = [seat.team for seat in scene.seats]
     if complete and len(set(teams)) > 1:
-        _result(found, players, teams, end["success"])
-    for i, player in enumerate(players):
-        measure(player, i, seats[i], meta, steps)
+        success = episode.columns["success"][-1]
+        won = [bool(success[i]) for i in range(len(teams))]
+        _result(found, players, teams, won)
+    if len(episode):
+        for i, player in enumerate(players):
+            measure(player, i, scene, episode, head["control_dt"])
 
 
-def _program(name: str, handicap: dict[str, float]) -> str:
+def _program(name: str, handicap: dict[str, float] | None) -> str:
     """Return a program's name, with its handicap if it has one."""
-    caption = Handicap(**handicap).caption
+    caption = Handicap(**handicap).caption if handicap else ""
     return f"{name} ({caption})" if caption else name
 
 

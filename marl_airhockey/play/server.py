@@ -19,9 +19,10 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from marl_airhockey.evaluation.recordings import read
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.protocol import LARGEST
+from marl_airhockey.play.real_match import RealMatch
+from marl_airhockey.play.replay import replay_of
 from marl_airhockey.play.session import Session
 
 WEB = Path(__file__).parent / "web"
@@ -91,10 +92,7 @@ def replay(path: Path, access: AccessCheck) -> Starlette:
     Raises:
         ValueError: no recording, or one without steps.
     """
-    meta, steps, end = read(path)
-    if not steps:
-        raise ValueError(f"{path}: there are no steps in it")
-    recording = {"meta": meta, "steps": steps, "end": end}
+    recording = replay_of(path)
 
     async def send_recording(request: Request) -> Response:
         reason = access.refusal(request)
@@ -129,7 +127,8 @@ def application(session: Session, access: AccessCheck) -> Starlette:
             await socket.close(1013, "too many are watching")
             return
         await socket.accept()
-        client = session.connect()
+        peer = socket.client.host if socket.client else ""
+        client = session.connect(remote=peer not in LOOPBACK)
         writer = asyncio.create_task(_write(socket, session, client))
         try:
             while (message := await socket.receive())["type"] == "websocket.receive":
@@ -141,8 +140,45 @@ def application(session: Session, access: AccessCheck) -> Starlette:
             session.disconnect(client)
             writer.cancel()
 
-    routes = _page(access, "live", WebSocketRoute("/ws", connection))
-    return Starlette(routes=routes, lifespan=lifespan)
+    async def picture(request: Request) -> Response:
+        reason = access.refusal(request)
+        if reason is not None:
+            return PlainTextResponse(reason + "\n", 403)
+        if not isinstance(session.match, RealMatch):
+            return PlainTextResponse("there is no camera\n", 404)
+        try:
+            packed = await asyncio.to_thread(session.match.picture)
+        except RuntimeError as error:
+            return PlainTextResponse(f"{error}\n", 503)
+        return Response(packed, media_type="image/jpeg")
+
+    async def video(socket: WebSocket) -> None:
+        """Send the table from above, each picture when the last one was drawn."""
+        match, reason = session.match, access.refusal(socket)
+        if reason is not None or not isinstance(match, RealMatch):
+            await socket.close(1008, reason or "there is no camera")
+            return
+        await socket.accept()
+        number = -1
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
+            while True:
+                taken = await asyncio.to_thread(match.live_picture, number)
+                if taken is None:
+                    await socket.send_bytes(b"")
+                else:
+                    number = taken[0]
+                    await socket.send_bytes(taken[2])
+                await asyncio.wait_for(socket.receive_text(), STALLED)
+                if taken is not None:
+                    match.note_drawn(taken[1])
+        match.drawn_after.clear()
+
+    own = (
+        WebSocketRoute("/ws", connection),
+        WebSocketRoute("/video", video),
+        Route("/camera", picture),
+    )
+    return Starlette(routes=_page(access, "live", *own), lifespan=lifespan)
 
 
 def _note_failure(session: Session, task: asyncio.Task[None]) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from marl_airhockey.play.client import Client
@@ -13,13 +15,26 @@ from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
 from marl_airhockey.play.match_loop import MatchLoop
 from marl_airhockey.play.protocol import parse
+from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.recorder import Recorder
 
 IDLE = 60.0
 """Time without a movement after which a page loses its seat, s."""
 GRACE = 10.0
 """Time for which the seat of a page that has gone, say to reload, is reserved, s."""
+LET_GO = 0.3
+"""Time without news of a held pointer after which a real arm rests, s"""
 GONE = "a player has gone"
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Plant behind a table, in which things can go wrong on demand."""
+
+    faults: Mapping[str, str] = field(default_factory=dict)
+    """Faults by name, in words"""
+    switch: Callable[[str, bool], None] = lambda name, on: None
+    """Switches one on or off"""
 
 
 class Session(MatchLoop):
@@ -29,6 +44,7 @@ class Session(MatchLoop):
         "leave",
         "opponent",
         "handicap",
+        "fault",
     }
     """Kinds of messages that pages may send."""
 
@@ -36,6 +52,8 @@ class Session(MatchLoop):
         super().__init__(match, recorder)
         self._reserved: dict[str, tuple[int, float]] = {}
         """Seat, and time until which it is reserved, by key of a page."""
+        self.plant = Plant()
+        """What pages may let go wrong, of a virtual lab."""
 
     @property
     def free_seats(self) -> list[int]:
@@ -44,9 +62,15 @@ class Session(MatchLoop):
         names = enumerate(self.match.drivers.names)
         return [i for i, name in names if name == PERSON and i not in taken]
 
-    def connect(self) -> Client:
-        """Add a page; it gets a seat when it has said hello."""
+    def connect(self, remote: bool = False) -> Client:
+        """Add a page; it gets a seat when it has said hello.
+
+        Args:
+            remote: True for one on another machine.
+        """
         client = Client()
+        # A real arm takes motion from its own machine alone; all others watch.
+        client.watches = remote and isinstance(self.match, RealMatch)
         self.clients.add(client)
         return client
 
@@ -68,6 +92,8 @@ class Session(MatchLoop):
         kind, fields = parse(text)
         if kind not in self.ACCEPTED:
             raise ValueError(f"{kind}: not at this table")
+        if client.watches:
+            return
         getattr(self, f"_on_{kind}")(client, **fields)
 
     # Handlers of messages, by kind.
@@ -82,11 +108,18 @@ class Session(MatchLoop):
         elif client.seat is None and self.free_seats:
             self._take(client, self.free_seats[0])
 
-    def _on_aim(self, client: Client, x: float, y: float, q: int, rtt: float) -> None:
+    def _on_aim(
+        self, client: Client, x: float, y: float, held: int, q: int, rtt: float
+    ) -> None:
         if client.seat is None:
             return
         mouse: Any = self.match.drivers.input_device(client.seat, "mouse")
-        mouse.aim(*self.match.to_ego(client.seat, x, y))
+        if held:
+            client.last_held = time.monotonic()
+        if held or not isinstance(self.match, RealMatch):
+            mouse.aim(*self.match.to_ego(client.seat, x, y))
+        else:
+            mouse.rest()
         if (x, y) != client.pointer:
             client.pointer, client.last_input = (x, y), time.monotonic()
         client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
@@ -96,6 +129,7 @@ class Session(MatchLoop):
             return
         gamepad: Any = self.match.drivers.input_device(client.seat, "gamepad")
         gamepad.push(*self.match.to_ego(client.seat, x, y))
+        client.last_held = time.monotonic()
         if (x, y) != (0.0, 0.0):
             client.last_input = time.monotonic()
         client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
@@ -149,7 +183,19 @@ class Session(MatchLoop):
     def _on_handicap(self, client: Client, name: str) -> None:
         between_matches = self.match.phase in ("lobby", "done")
         if self._may_control(client) and name in PRESETS and between_matches:
-            self.match.set_handicap(PRESETS[name])
+            with contextlib.suppress(ValueError):
+                self.match.set_handicap(PRESETS[name])
+
+    def _on_fault(self, client: Client, name: str, on: int) -> None:
+        if name in self.plant.faults:
+            self.plant.switch(name, bool(on))
+
+    def describe(self) -> dict[str, Any]:
+        return {
+            **super().describe(),
+            "camera": isinstance(self.match, RealMatch),
+            "faults": dict(self.plant.faults),
+        }
 
     def _may_control(self, client: Client) -> bool:
         """Return True for pages with a seat, and for all if only programs play."""
@@ -165,6 +211,15 @@ class Session(MatchLoop):
         mouse.rest()
         client.seat = None
         self.match.pause(reason)
+
+    def _check_hands(self, now: float) -> None:
+        """Let an arm rest whose person holds nothing, or is not heard any more."""
+        drivers = self.match.drivers
+        for client in self.clients:
+            if client.seat is not None and now - client.last_held > LET_GO:
+                kind = drivers.kind_of_device(client.seat)
+                device: Any = drivers.input_device(client.seat, kind)
+                device.rest()
 
     def _check_presence(self, now: float) -> None:
         """Free the seats of idle pages, and drop reservations that have expired."""

@@ -30,7 +30,8 @@ class NumpyPolicy:
         centre: (D,) subtracted from the observation.
         unit: (D,) divisor of the difference.
         log_std: (2,) log standard deviation of the action noise in training.
-        card: scenario and its version, settings and results of the training.
+        card: scenario and its version, settings and results of the training; with
+            "bounded", the hyperbolic tangent follows the last layer.
     """
 
     layers: Sequence[tuple[Array, Array]]
@@ -53,7 +54,8 @@ class NumpyPolicy:
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)
         weight, bias = self.layers[-1]
-        return np.asarray(x @ weight.T + bias)
+        action = x @ weight.T + bias
+        return np.asarray(np.tanh(action) if self.card.get("bounded") else action)
 
     def save(self, path: Path) -> None:
         """Write an .npz that includes the card; the file is replaced atomically."""

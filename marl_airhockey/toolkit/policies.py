@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -172,11 +172,28 @@ def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPol
             f"no .npz holds this policy (it has no {error}): only those on flat "
             "observations or goals, with ReLU layers"
         ) from error
-    # Goals follow the flat part as they are.
-    goals = pairs[0][0].shape[1] - len(centre)
-    centre, unit = np.pad(centre, (0, goals)), np.pad(1.0 / rate, (0, goals))
-    unit[len(rate) :] = 1.0
-    return NumpyPolicy(pairs, centre, unit, log_std, card)
+    return scaled_policy(pairs, centre, 1.0 / rate, log_std, card)
+
+
+def scaled_policy(
+    layers: Sequence[tuple[Array, Array]],
+    centre: Array,
+    unit: Array,
+    log_std: Array,
+    card: Mapping[str, Any],
+) -> NumpyPolicy:
+    """Return a policy whose goals, if it has some, follow the flat part as they are.
+
+    Args:
+        layers: see `NumpyPolicy`.
+        centre: (D,) of the flat part.
+        unit: (D,) of the flat part.
+        log_std: see `NumpyPolicy`.
+        card: see `NumpyPolicy`.
+    """
+    goals = (0, layers[0][0].shape[1] - len(centre))
+    unit = np.pad(unit, goals, constant_values=1.0)
+    return NumpyPolicy(layers, np.pad(centre, goals), unit, log_std, card)
 
 
 def load_weights(path: Path) -> Mapping[str, Any]:

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.core.recording import SUFFIX, read_recording
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.data.columns import scenario_of
 from marl_airhockey.evaluation.evaluate import build_driven_world
-from marl_airhockey.evaluation.recordings import read
-from marl_airhockey.registry import make_scenario
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 
@@ -91,28 +91,26 @@ def record_play(
 
 
 def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
-    """Read recordings of ``airhockey play --record``.
+    """Read recordings.
 
     Raises:
         ValueError: no recordings, or recordings of several scenarios.
     """
-    parts: list[tuple[Array, ...]] = []
-    names = set()
-    for path in paths:
-        meta, steps, _ = read(path)
-        names.add(meta["match"]["scenario"])
-        scenario = make_scenario(meta["match"]["scenario"], **meta["options"])
-        position = np.array(
-            [row["paddles"] + [p[:2] for p in row["pucks"]] for row in steps]
-        )
-        velocity = np.array(
-            [row["paddle_velocities"] + [p[2:] for p in row["pucks"]] for row in steps]
-        )
-        command = np.array([row["command"] for row in steps])
-        follows = np.arange(len(steps)) > 0
-        parts.append((position, velocity, command, follows))
+    recordings = [read_recording(path) for path in paths]
+    names = {recording.head["scenario"] for recording in recordings}
     if len(names) != 1:
-        found = ", ".join(sorted(names)) or "no recordings (.jsonl files)"
+        found = ", ".join(sorted(names)) or f"no recordings ({SUFFIX} files)"
         raise ValueError(f"recordings of one scenario are needed, there are: {found}")
+    scenario = scenario_of(recordings[0])
+    episodes = [e.columns for r in recordings for e in r.episodes if len(e)]
+    parts = [
+        (
+            columns["state.position"],
+            columns["state.velocity"],
+            columns["command"],
+            np.arange(len(columns["command"])) > 0,
+        )
+        for columns in episodes
+    ]
     columns = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return RecordedPlay(scenario.scene, meta["control_dt"], *columns)
+    return RecordedPlay(scenario.scene, recordings[0].head["control_dt"], *columns)

@@ -13,8 +13,8 @@ def line(kind, **fields):
     return json.dumps({"t": kind, **fields})
 
 
-def aim(x, y, q=1):
-    return line("aim", x=x, y=y, q=q, rtt=0)
+def aim(x, y, q=1, held=0):
+    return line("aim", x=x, y=y, held=held, q=q, rtt=0)
 
 
 @contextlib.contextmanager

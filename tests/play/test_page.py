@@ -133,4 +133,7 @@ def test_a_participant_in_the_browser(browser, tmp_path):
         page.get_by_role("button", name="Take part").wait_for()
         page.close()
     assert not complaints
-    assert [p.name for p in (tmp_path / "o").rglob("*.jsonl")] == ["erased.jsonl"]
+    kept = [
+        p.name for p in (tmp_path / "o").rglob("*") if p.suffix in (".jsonl", ".rec")
+    ]
+    assert kept == ["erased.jsonl"]

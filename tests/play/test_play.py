@@ -10,12 +10,11 @@ from pages import aim, line
 from marl_airhockey.play.handicap import PRESETS, Handicap
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.session import IDLE, Session
-from marl_airhockey.registry import scenario_names
 
 
-@pytest.mark.parametrize("name", scenario_names())
-def test_every_scenario_is_played_and_drawn(name):
-    match = LiveMatch(name, {}, {}, seed=3)
+@pytest.mark.compiles_much
+def test_every_scenario_is_played_and_drawn(scenario):
+    match = LiveMatch(scenario, {}, {}, seed=3)
     assert match.drivers.names == ["person"] * len(match.seats)
     match.start()
     for _ in range(4 * RATE):
@@ -153,16 +152,20 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
 @pytest.mark.parametrize(
     ("game", "keywords", "fitting"),
     [
-        ("duel", {}, ["zoo/duel"]),
+        ("duel", {}, ["zoo/duel", *(f"zoo/duel_{k}" for k in (1, 2, 3, 4))]),
         ("duel", {"options": {"pucks": 2}}, []),
-        (
+        pytest.param(
             "duel",
             {"options": {"seats": "robot", "reaction": 0.0}, "profile": "ur5e"},
             ["zoo/duel_robot"],
+            marks=pytest.mark.slow,
         ),
-        ("free_for_all", {"options": {"sides": 3}}, []),
+        pytest.param(
+            *("free_for_all", {"options": {"sides": 3}}, []), marks=pytest.mark.slow
+        ),
         ("juggle", {}, ["zoo/juggle", "zoo/juggle_ur5e"]),
         ("juggle", {"profile": "ur5e"}, ["zoo/juggle_ur5e", "zoo/juggle"]),
+        ("juggle", {"options": {"table": "full_size"}}, ["zoo/juggle_full_size"]),
     ],
 )
 def test_policies_that_fit_are_offered(game, keywords, fitting):

@@ -13,7 +13,7 @@ import pytest
 import websockets
 from pages import aim, line, served
 
-from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.core.recording import read_recording
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.protocol import BURST, LARGEST, RateLimiter, parse
 from marl_airhockey.play.server import listen as listen_at
@@ -30,15 +30,15 @@ BAD = {
     "{}": "t: must be one of",
     '{"t":"fly"}': "t: must be one of",
     '{"t":["aim"]}': "t: must be one of",
-    '{"t":"aim"}': "aim: fields must be ['q', 'rtt', 'x', 'y']",
+    '{"t":"aim"}': "aim: fields must be ['held', 'q', 'rtt', 'x', 'y']",
     '{"t":"aim","x":0,"y":0,"q":1}': "aim: fields must be",
-    '{"t":"aim","x":0,"y":0,"q":1,"rtt":0,"z":1}': "aim: fields must be",
-    '{"t":"aim","x":NaN,"y":0,"q":1,"rtt":0}': "NaN is no number",
-    '{"t":"aim","x":Infinity,"y":0,"q":1,"rtt":0}': "Infinity is no number",
-    '{"t":"aim","x":1e300,"y":0,"q":1,"rtt":0}': "x: must be a number",
-    '{"t":"aim","x":"0","y":0,"q":1,"rtt":0}': "x: must be a number",
-    '{"t":"aim","x":true,"y":0,"q":1,"rtt":0}': "x: must be a number",
-    '{"t":"aim","x":0,"y":0,"q":-1,"rtt":0}': "q: must be a whole number",
+    '{"t":"aim","x":0,"y":0,"held":0,"q":1,"rtt":0,"z":1}': "aim: fields must be",
+    '{"t":"aim","x":NaN,"y":0,"held":0,"q":1,"rtt":0}': "NaN is no number",
+    '{"t":"aim","x":Infinity,"y":0,"held":0,"q":1,"rtt":0}': "Infinity is no number",
+    '{"t":"aim","x":1e300,"y":0,"held":0,"q":1,"rtt":0}': "x: must be a number",
+    '{"t":"aim","x":"0","y":0,"held":0,"q":1,"rtt":0}': "x: must be a number",
+    '{"t":"aim","x":true,"y":0,"held":0,"q":1,"rtt":0}': "x: must be a number",
+    '{"t":"aim","x":0,"y":0,"held":0,"q":-1,"rtt":0}': "q: must be a whole number",
     '{"t":"sit","seat":0.5}': "seat: must be a whole number",
     '{"t":"hello","key":""}': "key: must be 1 to 80 characters",
     '{"t":"hello","key":"' + "x" * 81 + '"}': "key: must be 1 to 80 characters",
@@ -181,9 +181,9 @@ def test_a_killed_server_loses_no_second_of_a_recording(tmp_path):
         it.kill()
         it.wait(10)
     (path,) = tmp_path.iterdir()
-    _, steps, end = read(path)
-    assert end == {}
-    assert steps[-1]["n"] >= shown - RATE
+    (episode,) = read_recording(path).episodes
+    assert episode.end == {}
+    assert len(episode) >= shown - RATE
 
 
 def test_a_taken_port_is_named():

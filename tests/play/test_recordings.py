@@ -8,12 +8,13 @@ import pytest
 from pages import aim, line
 from PIL import Image
 
-from marl_airhockey.evaluation.recordings import read
+from marl_airhockey.core.recording import read_recording
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.measures import interceptions, reactions
 from marl_airhockey.play.plots import plot_report
 from marl_airhockey.play.protocol import RateLimiter
 from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.replay import replay_of
 from marl_airhockey.play.report import summarize
 from marl_airhockey.play.session import Session
 from marl_airhockey.play.video import write_recording_video
@@ -30,39 +31,44 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
     while match.phase != "done":
         session.tick()
     (path,) = tmp_path.iterdir()
-    meta, steps, end = read(path)
-    assert meta["players"][0] == {
+    recording = read_recording(path)
+    assert recording.head["players"][0] == {
         "seat": 0,
         "driver": "person",
         "person": client.name,
         "consent": None,
     }
-    assert meta["physics"]["tilt"] == 0.0
-    assert len(steps) == 2 * RATE == end["steps"]
-    assert steps[-1]["n"] == 2 * RATE
-    assert set(steps[0]) >= {"action", "command", "terms", "clock", "delays", "paddles"}
-    np.testing.assert_allclose(
-        steps[-1]["paddles"], match.world.state.paddle[0], atol=1e-4
-    )
+    (episode,) = recording.episodes
+    assert episode.notes["physics"]["tilt"] == 0.0
+    assert episode.end["reason"] == "played to the end"
+    assert len(episode) == 2 * RATE == episode.end["steps"]
+    assert {"action", "command", "clock", "round_trip"} <= episode.columns.keys()
+    end = episode.columns["state.position"][-1]
+    np.testing.assert_array_equal(end, match.world.state.position[0])
     write_recording_video(path, tmp_path / "game.gif")
     with Image.open(tmp_path / "game.gif") as video:
         assert video.n_frames == RATE
-    rows = path.read_text().splitlines()
-    path.write_text("\n".join([rows[0], '{"kind":"step","n":1}']))
-    with pytest.raises(ValueError, match="line 2 lacks"):
-        read(path)
-    path.write_text(rows[0].replace('"format":2', '"format":1'))
-    with pytest.raises(ValueError, match=f"{path.name}: recorded by an older version"):
-        read(path)
-    path.write_text(rows[0])
-    with pytest.raises(ValueError, match="no steps"):
-        write_recording_video(path, tmp_path / "game.gif")
-    path.write_bytes(b"\xff\x00")
-    with pytest.raises(ValueError, match="cannot be read"):
-        read(path)
-    path.write_text("nothing")
-    with pytest.raises(ValueError, match="no recording"):
-        read(path)
+
+
+def test_a_replay_is_what_the_page_was_shown(tmp_path):
+    options = {"options": {"seconds": 2.0}, "backend": "numba"}
+    seats = {"paddle_0": "allround", "paddle_1": "striker"}
+    match = LiveMatch("duel", seats, options, seed=5)
+    session = Session(match, Recorder(tmp_path))
+    match.start()
+    shown = []
+    while match.phase != "done":
+        session.tick()
+        if match.ticks > len(shown):
+            shown.append(match.state())
+    (path,) = tmp_path.iterdir()
+    replayed = replay_of(path)
+    assert replayed["meta"]["match"] == match.describe()
+    steps = replayed["steps"]
+    assert len(steps) == len(shown) + 1
+    assert any(step["events"] for step in shown)
+    for was, now in zip(shown[:-1], steps[1:-1], strict=True):
+        assert was == now
 
 
 def test_recordings_become_a_report(tmp_path):
@@ -136,5 +142,5 @@ def test_a_match_whose_players_change_does_not_count(tmp_path):
     for _ in range(5 * RATE):
         session.tick()
     (path,) = tmp_path.iterdir()
-    _, _, end = read(path)
-    assert end["reason"] == "the players changed"
+    (episode,) = read_recording(path).episodes
+    assert episode.end["reason"] == "the players changed"

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from bench import DT, TABLE, Bench
-from conftest import ideal_backends
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from names import ideal_backends
 from pair import Pair
 
 import marl_airhockey as ah

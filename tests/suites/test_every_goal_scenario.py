@@ -19,7 +19,7 @@ def test_every_goal_scenario_is_known_to_this_test(goal_scenario):
 
 
 def test_only_goal_scenarios_have_dicts(scenario):
-    from conftest import GOALS
+    from names import GOALS
 
     if scenario in GOALS:
         return

@@ -130,6 +130,7 @@ def test_a_row_of_many_worlds_equals_a_single_world(scenario, backend):
             np.testing.assert_array_equal(a[row], b[0])
 
 
+@pytest.mark.compiles_much
 @pytest.mark.parametrize("profile", ["ideal", "ur5e"])
 def test_observations_lie_in_their_space_and_none_is_constant(
     scenario, backend, profile
@@ -227,6 +228,7 @@ def test_luck_does_not_succeed(single, driver):
         assert result.success <= bar + 3 * np.sqrt(bar * (1 - bar) / 400)
 
 
+@pytest.mark.compiles_much
 def test_options_reach_the_scenario(scenario, backend):
     for seats in ("robot", "arcade"):
         env = ah.parallel_env(scenario, backend=backend, seats=seats)

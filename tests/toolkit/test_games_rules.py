@@ -195,7 +195,10 @@ def test_what_one_team_wins_the_other_loses(name, backend):
     assert paid > 0
 
 
-@pytest.mark.parametrize("sides", [3, 4, 5])
+MORE_SIDES = [pytest.param(count, marks=pytest.mark.slow) for count in (4, 5)]
+
+
+@pytest.mark.parametrize("sides", [3, *MORE_SIDES])
 def test_lives_are_lost_goals_close_and_the_last_one_wins(backend, sides):
     options = {"sides": sides, "lives": 2}
     world = ah.make_world("free_for_all", 3, backend=backend, options=options)

@@ -26,7 +26,12 @@ class Person(Driver):
         return self.tactics.act(replace(view, state=state), memory)
 
 
-@pytest.mark.parametrize("script", ["goalkeeper", "striker", "allround"])
+OTHERS = [
+    pytest.param(name, marks=pytest.mark.slow) for name in ("striker", "allround")
+]
+
+
+@pytest.mark.parametrize("script", ["goalkeeper", *OTHERS])
 def test_a_weak_script_loses_to_a_person(script):
     weak = [make_agent(f"{script}:strength=weak")]
     late = {"options": {"reaction": REACTION}}

@@ -54,7 +54,7 @@ def test_recordings_are_fitted_to(tmp_path):
         while match.phase != "done":
             session.tick()
         session.tick()
-    seen = load_recordings(sorted(tmp_path.glob("*.jsonl")))
+    seen = load_recordings(sorted(tmp_path.glob("*.rec")))
     assert seen.control_dt == pytest.approx(1 / RATE)
     assert not seen.follows[0]
     assert np.isfinite(seen.position).all()

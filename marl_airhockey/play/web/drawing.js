@@ -71,8 +71,11 @@ function alpha(hex, share) { return hex + Math.round(share * 255).toString(16).p
 function drawTable() {
   const corners = match.table, count = corners.length;
   pen.lineJoin = "round";
-  path(corners); pen.strokeStyle = inks.rail; pen.lineWidth = 0.08 * fit.scale; pen.stroke();
-  pen.fillStyle = inks.field; pen.fill();
+  const video = drawVideo();
+  if (!video) {
+    path(corners); pen.strokeStyle = inks.rail; pen.lineWidth = 0.08 * fit.scale; pen.stroke();
+    pen.fillStyle = inks.field; pen.fill();
+  }
   pen.lineWidth = Math.max(1, 0.004 * fit.scale);
   if (count === 4 && new Set(match.seats.map((s) => s.side)).size <= 2) {
     const half = Math.abs(corners[0][1]), long = Math.abs(corners[0][0]);
@@ -80,7 +83,7 @@ function drawTable() {
     for (const x of [-long / 2, long / 2]) { path([[x, -half], [x, half]], false); pen.stroke(); }
     pen.strokeStyle = inks.print; path([[0, -half], [0, half]], false); pen.stroke();
   }
-  disc(0, 0, 0.14, null, inks.print); disc(0, 0, 0.012, inks.print);
+  if (!video) { disc(0, 0, 0.14, null, inks.print); disc(0, 0, 0.012, inks.print); }
   match.seats.forEach((seat, i) => {
     const t = seat.rotation, back = seat.reach.map(([u, v]) => [t[0][0] * u + t[1][0] * v, t[0][1] * u + t[1][1] * v]);
     path(back); pen.strokeStyle = alpha(colour(i), 0.22); pen.stroke();
@@ -111,6 +114,9 @@ function drawMarks() {
   }
 }
 
+// True while the video shows the bodies themselves: what is believed is outlined then.
+const filmed = () => showsVideo() && live !== null;
+
 function drawBodies(share) {
   const mix = (a, b) => (a === undefined ? b : a + share * (b - a));
   const old = before && before.n <= now.n && now.n - before.n < 12 ? before : now;
@@ -135,6 +141,7 @@ function drawBodies(share) {
     if (now.retired.includes(i)) return;
     const o = old.paddles[i] || p, own = i === now.seat && ownPaddle;
     const x = own ? ownPaddle.x : mix(o[0], p[0]), y = own ? ownPaddle.y : mix(o[1], p[1]);
+    if (filmed()) { pen.lineWidth = Math.max(2, 0.006 * fit.scale); disc(x, y, match.paddle_radius, null, colour(i)); return; }
     disc(x, y, match.paddle_radius, colour(i), alpha("#000000", 0.45));
     disc(x, y, match.paddle_radius * 0.52, alpha("#ffffff", 0.28), alpha("#000000", 0.25));
     if (i === now.seat) disc(x, y, match.paddle_radius * 0.16, "#ffffff");
@@ -142,6 +149,7 @@ function drawBodies(share) {
   now.pucks.forEach((p, i) => {
     const o = old.pucks[i] || p, jump = far(o, p);
     const x = jump ? p[0] : mix(o[0], p[0]), y = jump ? p[1] : mix(o[1], p[1]), turn = mix(old.puck_angles[i], now.puck_angles[i]);
+    if (filmed()) { pen.lineWidth = Math.max(2, 0.006 * fit.scale); disc(x, y, match.puck_radius, null, "#e6c700"); return; }
     disc(x, y, match.puck_radius, inks.puck, alpha("#888888", 0.7));
     const c = 0.55 * match.puck_radius * Math.cos(turn), s = 0.55 * match.puck_radius * Math.sin(turn); // a stripe shows how it spins
     path([[x - c, y - s], [x + c, y + s]], false); pen.strokeStyle = alpha("#888888", 0.7); pen.stroke();

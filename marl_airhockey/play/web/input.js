@@ -1,9 +1,14 @@
 "use strict";
 // Pointer, stick, keys and buttons; sounds.
 
+// A real arm moves only while a button or a finger is down: the dead-man's switch.
+const grips = () => !match.camera || held;
+
 function aim(event) {
   if (!fit) return;
-  const box = canvas.getBoundingClientRect();
+  const box = canvas.getBoundingClientRect(), held_before = held;
+  held = Boolean(event.buttons & 1);
+  if (!grips() && !held_before) return;
   pointer = fromScreen(event.clientX - box.left, event.clientY - box.top);
   pointedAt = event.timeStamp;
   steered = false;
@@ -16,7 +21,7 @@ function sendInput(at) {
   const pad = stick();
   if (pad) { steered = true; pointer = null; sentAt = at; send("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: roundTrip || 0 }); pending.set(aimed, at); return; }
   const fresh = pointedAt !== null;
-  if (!pointer || (!fresh && at - sentAt < 250)) return;
+  if (!pointer || (!fresh && at - sentAt < (match.camera ? 80 : 250))) return;
   pending.set(++aimed, fresh ? pointedAt : at);
   predicted.push([aimed, ownPaddle ? ownPaddle.x : 0, ownPaddle ? ownPaddle.y : 0]);
   if (predicted.length > 90) predicted.shift();
@@ -24,7 +29,8 @@ function sendInput(at) {
   pointedAt = null;
   sentAt = at;
   const limit = (v) => Math.max(-10, Math.min(10, v));
-  send("aim", { x: limit(pointer[0]), y: limit(pointer[1]), q: aimed, rtt: roundTrip || 0 });
+  send("aim", { x: limit(pointer[0]), y: limit(pointer[1]), held: Number(held), q: aimed, rtt: roundTrip || 0 });
+  if (!grips()) pointer = null;
 }
 
 let stickUsed = 0;
@@ -45,10 +51,13 @@ addEventListener("blur", () => pressed.clear());
 
 // Raw updates come at once; others wait for the next picture.
 canvas.addEventListener("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", aim);
-canvas.addEventListener("pointerdown", (event) => { aim(event); canvas.focus(); });
+canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); aim(event); canvas.focus(); });
+function letGo() { if (held) { held = false; if (fit && match.camera && pointer) sendInput(performance.now() + 1e3); } }
+for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(kind, letGo);
+addEventListener("blur", letGo);
 function toggle() {
   if (recording) { if (!recording.runs && recording.at >= recording.steps.length - 1) recording.at = 0; recording.runs = !recording.runs; return; }
-  send(now && (now.phase === "play" || now.phase === "countdown") ? "pause" : "start");
+  send(now && ["play", "countdown", "arrange"].includes(now.phase) ? "pause" : "start");
 }
 addEventListener("keydown", (event) => {
   if (["SELECT", "INPUT"].includes(event.target.tagName) || event.repeat) return;

@@ -13,10 +13,11 @@ let socket = null, down = false, refused = "";
 let pointer = null, pointedAt = null, aimed = 0, sentAt = 0, roundTrip = null, flash = 0, flashColour = "";
 let ownPaddle = null; // predicted own paddle: x, y, vx, vy
 let predicted = []; // [aim, x, y] of the last aims
+let held = false; // a button or a finger is down on the table
 let steered = false; // by a stick or keys: nothing is predicted then
 let trails = [], fit = null, drawnAt = performance.now();
 const pending = new Map(); // aim -> time of the pointer event
-const probe = (window.airhockey = { frames: [], latencies: [], state: () => now });
+const probe = (window.airhockey = { frames: [], latencies: [], pictures: [], state: () => now });
 
 // A key of this page alone, kept over a reload, by which it gets its seat back.
 const key = sessionStorage.getItem("key") || Math.random().toString(36).slice(2) + Date.now().toString(36);
@@ -35,7 +36,7 @@ function connect() {
   socket.onopen = () => { down = false; refused = ""; send("hello", { key }); for (const text of unsent.splice(0)) socket.send(text); };
   socket.onmessage = (event) => {
     const data = JSON.parse(event.data);
-    if (data.t === "match") { match = data; trails = []; ownPaddle = null; panel = ""; resize(); return; }
+    if (data.t === "match") { match = data; trails = []; ownPaddle = null; panel = ""; resize(); openRealTable(); return; }
     receive(data);
   };
   socket.onclose = (event) => { down = true; refused = event.reason; setTimeout(connect, 1000); };
@@ -52,8 +53,8 @@ async function begin() {
   match = meta.match;
   const seats = meta.players.map((p) => ({ driver: p.driver, taken: p.person !== null }));
   recording = { at: 0, runs: true, end, shown: -1, rate: 1 / meta.control_dt };
-  recording.steps = [meta.first_state, ...steps].map((step) => ({ ...step, seats, seat: null, ack: 0, watching: 0, rate: 1 / meta.control_dt, recording: false }));
-  $("scrub").max = steps.length;
+  recording.steps = steps.map((step) => ({ ...step, seats, seat: null, ack: 0, watching: 0, rate: 1 / meta.control_dt, recording: false }));
+  $("scrub").max = steps.length - 1;
   $("timeline").hidden = false;
   for (const name of ["swap", "leave", "handicap", "stop"]) $(name).hidden = true;
   $("scrub").oninput = () => { recording.at = Number($("scrub").value); trails = []; };

@@ -10,6 +10,7 @@ function show(headline, detail, go, bare = false) {
 function updateWords() {
   put($("name"), match.scenario.replaceAll("_", " "));
   scoreboard();
+  updateRealTable();
   put($("clock"), `${Math.max(0, match.seconds - now.time).toFixed(0)} s`);
   put($("trip"), roundTrip === null ? "" : `round trip ${roundTrip.toFixed(0)} ms`);
   put($("rate"), `loop ${now.rate.toFixed(1)} Hz`);
@@ -17,10 +18,10 @@ function updateWords() {
   $("recording").hidden = !now.recording;
   if (recording) { updateReplayWords(); return; }
   if (match.study) { updateStudyWords(); return; }
-  const runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
+  const runs = ["play", "countdown", "arrange"].includes(now.phase), sits = now.seat !== null;
   const free = now.seats.findIndex((s) => s.driver === "person" && !s.taken);
   const mayControl = (sits || now.seats.every((s) => s.driver !== "person")) && free < 0;
-  put($("pause"), runs ? "Pause" : "Start"); $("pause").disabled = !mayControl;
+  put($("pause"), runs ? (match.camera ? "Stop" : "Pause") : "Start"); $("pause").disabled = !mayControl;
   $("swap").hidden = now.seats.length < 2; $("swap").disabled = runs || now.phase === "pause" || !mayControl;
   $("leave").hidden = !sits;
   canvas.classList.toggle("mine", sits && now.phase === "play");
@@ -41,12 +42,20 @@ function updateReplayWords() {
 function notice(sits, free, mayControl) {
   $("stop").hidden = Boolean(match.study) || now.phase !== "pause" || !mayControl;
   if (down) show("No connection", refused || "trying again…", "");
+  else if (now.phase === "arrange") show("Getting ready", now.reason, "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), "", "", true);
   else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${match.what} Move the pointer to move your paddle. Space starts.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
-  else if (now.phase === "pause") show("Paused", now.reason, mayControl ? "Go on" : "");
+  else if (now.phase === "pause") show(match.camera ? "Your word" : "Paused", now.reason, mayControl ? "Go on" : "");
   else if (now.phase === "done") show(verdict(), now.reason, mayControl ? "Again" : "");
   else if (flash > 0.3) show("Goal!", "", "", true);
+  else if (now.phase === "play" && atRest()) show("", atRest(), "", true);
   else $("notice").hidden = true;
+}
+
+// Why a paddle that somebody leads rests; "" if none does.
+function atRest() {
+  if (match.camera && now.seat !== null && !held && !steered) return "hold the button down on the table to move the arm";
+  return (now.troubles || []).find(Boolean) || "";
 }
 
 function verdict() {
@@ -77,7 +86,7 @@ function scoreboard() {
 function titleOf(i) {
   const { driver, title } = now.seats[i];
   if (title !== undefined) return i === now.seat ? "You" : title;
-  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : driver.replace("zoo/", "policy ").replace(":strength=", ", ");
+  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : driver.replace("zoo/", "policy ").replace(":strength=", ", ").replace(/^shadow:.*/, "a hand");
 }
 
 let panel = "";
@@ -110,7 +119,7 @@ function seats(free) {
 
 function handicap(canChoose) {
   const list = $("handicap"), names = [...new Set([...match.handicaps, now.handicap])];
-  list.hidden = now.seats.every((s) => s.driver === "person");
+  list.hidden = match.camera || now.seats.every((s) => s.driver === "person");
   list.disabled = !canChoose;
   if (list.options.length !== names.length) { list.textContent = ""; for (const name of names) list.append(new Option(name)); }
   if (document.activeElement !== list) list.value = now.handicap;

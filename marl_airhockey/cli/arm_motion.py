@@ -1,0 +1,52 @@
+"""What the commands share that move an arm to measure it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from marl_airhockey.cli.options import bar
+from marl_airhockey.cli.real_table import rig_of
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.seat import make_seat
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.devices.rig import Rig
+from marl_airhockey.types import Array
+
+
+@contextmanager
+def moving_arm(
+    lab: bool, rig: Path | None, motions: int
+) -> Iterator[tuple[Rig, Path, Callable[[int], None]]]:
+    """Give an arm that a person has allowed to move.
+
+    Args:
+        lab: whether it is the virtual lab's.
+        rig: file of the devices of another.
+        motions: number of them.
+
+    Yields:
+        Its devices, their file, and a function that is called with the number of
+        motions that are done.
+    """
+    require("rtde_control", "hardware")
+    from marl_airhockey.backends.real.operator import make_operator
+
+    with rig_of(lab, rig) as path:
+        known = Rig.load(path)
+        reach = make_seat("robot", TABLES[known.table], 0).reach
+        make_operator(known.operator).begin(known.motion_words(reach))
+        with bar() as progress:
+            task = progress.add_task("motions", total=motions, note="")
+            yield known, path, lambda done: progress.update(task, completed=done)
+
+
+def summarize(values: Array) -> dict[str, float]:
+    """Return mean, standard deviation, least and most of values (n,)."""
+    return {
+        "mean": float(values.mean()),
+        "sd": float(values.std()),
+        "least": float(values.min()),
+        "most": float(values.max()),
+    }

@@ -1,0 +1,102 @@
+"""Command ``airhockey calibrate arm``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.arm_motion import moving_arm, summarize
+from marl_airhockey.cli.options import AsJson, console
+from marl_airhockey.cli.real_table import LabOption
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.servo import HALF
+from marl_airhockey.types import Array
+
+if TYPE_CHECKING:
+    from marl_airhockey.lab.calibration.arm import ArmTrial
+
+NAMES = "action_delay", "servo_time"
+"""Parameters that are measured"""
+
+
+def arm(
+    rig: Annotated[Path | None, typer.Option(help="File of the devices.")] = None,
+    repeats: Annotated[
+        int, typer.Option(help="Times that each motion is made, 10 s each.", min=1)
+    ] = 2,
+    plot: Annotated[
+        Path | None, typer.Option(help="Write a PNG of gain and phase.")
+    ] = None,
+    lab: LabOption = False,
+    as_json: AsJson = False,
+) -> None:
+    """Measure how an arm follows: its dead time and its lag, by steps and chirps.
+
+    It moves along both axes of the table, by 8 cm to each side and as far as 0.4 m/s.
+    """
+    from marl_airhockey.lab.calibration.arm import measure_arm
+
+    with moving_arm(lab, rig, 4 * repeats) as (known, _, tell):
+        trials = measure_arm(known, repeats, tell)
+    values = {
+        name: summarize(np.array([getattr(trial, name) for trial in trials]))
+        for name in NAMES
+    }
+    if plot is not None:
+        _plot(trials, values, plot)
+    if as_json:
+        rows = [vars(trial) for trial in trials]
+        console.print_json(json.dumps({**values, "trials": rows}))
+        return
+    table = Table("motion", "axis", "dead time, ms", "half-rise, ms", "model off, mm")
+    for trial in trials:
+        found = trial.action_delay, trial.servo_time, trial.misfit
+        cells = (f"{1e3 * value:.1f}" for value in found[:2])
+        table.add_row(trial.motion, trial.axis, *cells, f"{1e3 * found[2]:.2f}")
+    console.print(table)
+    console.print(_in_words(trials))
+
+
+def _response(trials: Sequence[ArmTrial]) -> dict[float, Array]:
+    """Return mean gain and phase, degrees, by frequency, of all chirps."""
+    chirps = [trial.response for trial in trials if trial.response]
+    return {f: np.mean([chirp[f] for chirp in chirps], 0) for f in chirps[0]}
+
+
+def _in_words(trials: Sequence[ArmTrial]) -> str:
+    """Return gain and phase at each frequency."""
+    parts = [
+        f"{f:g} Hz: {gain:.2f}, {phase:.0f} deg"
+        for f, (gain, phase) in _response(trials).items()
+    ]
+    return "gain and phase at " + "; ".join(parts)
+
+
+def _plot(trials: Sequence[ArmTrial], values: dict[str, Any], path: Path) -> None:
+    """Write measured gain and phase, and the model's, as a PNG."""
+    require("matplotlib", "train")
+    import matplotlib.pyplot as plt
+
+    from marl_airhockey.evaluation.charts import DPI, INK, save, tidy
+
+    f = np.linspace(0.5, 5.0, 200)
+    # A critically damped lag: both of its poles lie at this frequency.
+    angle = 2 * np.pi * f * values["servo_time"]["mean"] / HALF
+    phase = -2 * np.arctan(angle) - 2 * np.pi * f * values["action_delay"]["mean"]
+    model = (1 / (1 + angle**2), np.degrees(phase))
+    figure, panels = plt.subplots(1, 2, figsize=(7, 2.8), dpi=DPI, layout="constrained")
+    seen = _response(trials)
+    labels = ("gain", "phase, degrees")
+    for k, (axes, curve, label) in enumerate(zip(panels, model, labels, strict=True)):
+        axes.plot(f, curve, color=INK, label="dead time and lag")
+        axes.plot(seen.keys(), [row[k] for row in seen.values()], "o", label="chirps")
+        axes.set(xlabel="frequency, Hz", ylabel=label)
+        tidy(axes, None)
+    panels[0].legend(frameon=False)
+    save(figure, path)

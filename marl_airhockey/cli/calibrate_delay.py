@@ -1,0 +1,76 @@
+"""Command ``airhockey calibrate delay``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.arm_motion import moving_arm, summarize
+from marl_airhockey.cli.options import AsJson, console
+from marl_airhockey.cli.real_table import LabOption
+from marl_airhockey.core.errors import require
+
+if TYPE_CHECKING:
+    from marl_airhockey.lab.calibration.delay import Delays
+
+NAMES = "camera", "arm", "round trip"
+"""Delays that are measured"""
+
+
+def delay(
+    rig: Annotated[
+        Path | None, typer.Option(help="File of the devices; its latency is written.")
+    ] = None,
+    trials: Annotated[int, typer.Option(help="How many, a second each.", min=5)] = 200,
+    plot: Annotated[
+        Path | None, typer.Option(help="Write a PNG of the histograms.")
+    ] = None,
+    lab: LabOption = False,
+    as_json: AsJson = False,
+) -> None:
+    """Measure how late pictures come and how late the arm is, by the arm's own motion.
+
+    The arm goes to and fro by 9 cm; a camera of this machine gets its latency written
+    into the rig's file.
+    """
+    from marl_airhockey.lab.calibration.delay import measure_delays
+
+    with moving_arm(lab, rig, trials) as (known, path, tell):
+        found = measure_delays(known, trials, tell)
+        if known.camera.startswith("v4l2:"):
+            replace(known, latency=float(found.camera.mean())).save(path)
+    parts = found.camera, found.arm, found.round_trip
+    rows = {name: summarize(part) for name, part in zip(NAMES, parts, strict=True)}
+    if plot is not None:
+        _plot(found, plot)
+    if as_json:
+        console.print_json(json.dumps({"trials": len(found.camera), **rows}))
+        return
+    table = Table("delay, ms", "mean", "sd", "least", "most")
+    for name, row in rows.items():
+        table.add_row(name, *(f"{1e3 * value:.1f}" for value in row.values()))
+    console.print(table)
+    console.print(f"{len(found.camera)} of {trials} trials")
+
+
+def _plot(found: Delays, path: Path) -> None:
+    """Write the histograms of delays as a PNG."""
+    require("matplotlib", "train")
+    import matplotlib.pyplot as plt
+
+    from marl_airhockey.evaluation.charts import DPI, INK, save, tidy
+
+    figure, panels = plt.subplots(1, 3, figsize=(9, 2.8), dpi=DPI, layout="constrained")
+    parts = (found.camera, found.arm, found.round_trip)
+    for axes, name, values in zip(panels, NAMES, parts, strict=True):
+        axes.hist(1e3 * np.asarray(values), bins=24, color=INK)
+        axes.set(xlabel=f"{name}, ms")
+        tidy(axes, None)
+    panels[0].set_ylabel("trials")
+    save(figure, path)

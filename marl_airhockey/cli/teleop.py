@@ -1,0 +1,113 @@
+"""Command ``airhockey teleop``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli.options import (
+    Backend,
+    Options,
+    Profile,
+    console,
+    settings,
+)
+from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
+from marl_airhockey.core.errors import require
+from marl_airhockey.world.build import Keywords
+
+
+def teleop(
+    scenario: Annotated[str, typer.Argument(help="What is played.")],
+    by: Annotated[
+        Literal["mouse", "shadow"],
+        typer.Option(help="The page's pointer, or a hand under a camera of its own."),
+    ] = "mouse",
+    hand: Annotated[
+        Path | None,
+        typer.Option(help="Of --by shadow: file of that camera, calibrate --hand."),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the recordings.")] = Path(
+        "recordings"
+    ),
+    film: Annotated[
+        bool, typer.Option(help="Keep the camera's pictures beside them.")
+    ] = True,
+    opponent: Annotated[
+        str | None, typer.Option(help="Who sits at all other seats.")
+    ] = None,
+    backend: Backend = REAL,
+    profile: Profile = "ideal",
+    option: Options = None,
+    host: cli_play.Host = "127.0.0.1",
+    port: cli_play.Port = 8480,
+    browser: cli_play.Browser = True,
+    lab: LabOption = False,
+    rig: RigOption = None,
+) -> None:
+    """Lead the paddle yourself, on a real table by its live video, and record it.
+
+    On a real table the hand of --by shadow leads the arm; at a simulated seat it is the
+    paddle. --lab takes the virtual lab's devices.
+    """
+    require("starlette", "play")
+    require("uvicorn", "play")
+    from marl_airhockey.play.live_match import LiveMatch
+    from marl_airhockey.play.match_drivers import PERSON
+    from marl_airhockey.play.real_match import RealMatch
+
+    real = backend == REAL
+    if by == "mouse" and hand is not None:
+        raise ValueError("--hand: add --by shadow")
+    keywords: Keywords = {
+        "backend": backend,
+        "profile": profile,
+        "options": settings(option),
+    }
+    # Of a simulated table the lab has the hand alone.
+    with (
+        real_table(keywords, lab and real, rig) as table,
+        hand_file(by == "shadow", hand, lab) as path,
+    ):
+        match = (RealMatch if real else LiveMatch)(scenario, {}, table)
+        leader = (
+            f"shadow:rig={path},prescribe={str(not real).lower()}" if path else PERSON
+        )
+        cli_play.seat_drivers(match, opponent, {"paddle_0": leader})
+        with console.status("preparing the table (longer when it is the first time)"):
+            match.warm_up()
+        cli_play.host_match(match, out, host, port, browser, film)
+
+
+@contextmanager
+def hand_file(wanted: bool, hand: Path | None, lab: bool) -> Iterator[Path | None]:
+    """Give the file of the rig of a hand, while its lab runs; None if none is wanted.
+
+    Args:
+        wanted: whether a hand leads.
+        hand: its file.
+        lab: whether it is the virtual lab's.
+
+    Raises:
+        ValueError: neither a file nor a lab.
+        RuntimeError: the lab does not start.
+    """
+    if not wanted or hand is not None:
+        yield hand if wanted else None
+        return
+    if not lab:
+        raise ValueError("--by shadow: which camera? --hand FILE, or --lab")
+    from marl_airhockey.lab.calibration.lab_rig import hand_rig
+
+    with console.status("opening the lab (longer when it is the first time)"):
+        opened = hand_rig()
+        path = opened.__enter__()
+    try:
+        yield path
+    finally:
+        opened.__exit__(None, None, None)

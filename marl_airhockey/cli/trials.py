@@ -1,0 +1,193 @@
+"""Command ``airhockey trials``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import (
+    AsJson,
+    Backend,
+    Drivers,
+    Options,
+    Physics,
+    Profile,
+    Trusting,
+    app,
+    bar,
+    console,
+    environment,
+    scenario_for,
+)
+from marl_airhockey.cli.options import Scenario as ScenarioOption
+from marl_airhockey.cli.real_table import (
+    LabOption,
+    RigOption,
+    name_on_table,
+    real_table,
+)
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.world.build import Keywords
+
+if TYPE_CHECKING:
+    from marl_airhockey.evaluation.comparison import Comparison, Estimates
+    from marl_airhockey.evaluation.trial_sheet import TrialPlan, TrialSheet
+
+STARTS = "starts.csv"
+
+
+@app.command()
+def trials(
+    policies: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="[METHOD=]POLICY...",
+            help="Drivers and policies; several of a METHOD (its seeds) are one.",
+        ),
+    ],
+    scenario: ScenarioOption = None,
+    out: Annotated[
+        Path, typer.Option(help="Folder of the sheet; one there goes on.")
+    ] = Path("trials"),
+    number: Annotated[
+        int, typer.Option("--trials", help="Of each method.", min=1)
+    ] = 50,
+    starts: Annotated[
+        int, typer.Option(help="Fixed starts, which all methods play.", min=1)
+    ] = 25,
+    operator: Annotated[
+        str, typer.Option(help="Who puts the puck on the table, for the sheet.")
+    ] = "",
+    seed: Annotated[int, typer.Option(help="Of the order.")] = 0,
+    backend: Backend = DEFAULT_BACKEND,
+    profile: Profile = "ideal",
+    option: Options = None,
+    other: Drivers = None,
+    physics: Physics = None,
+    lab: LabOption = False,
+    rig: RigOption = None,
+    trust: Trusting = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compare policies on a table: same starts, in turns, the operator blinded."""
+    from marl_airhockey.evaluation.trial_sheet import plan_trials
+
+    methods = _methods([_on_table(text, backend) for text in policies])
+    drivers = {
+        name: [make_agent(path) for path in paths] for name, paths in methods.items()
+    }
+    game = scenario_for(next(iter(drivers.values()))[0], scenario)
+    keywords = environment(backend, profile, option, other, physics)
+    where = {
+        "backend": backend,
+        "profile": profile,
+        "options": option or [],
+        "drivers": other or [],
+        "physics": str(physics or ""),
+        "table": "lab" if lab else str(rig or ""),
+        "operator": operator,
+    }
+
+    def plan(chosen: list[int]) -> TrialPlan:
+        return plan_trials(game, methods, chosen, number, where, seed)
+
+    with real_table(keywords, lab, rig) as table:
+        sheet = _play(drivers, game, table, min(starts, number), plan, out)
+    found = sheet.compare()
+    result = {**found.to_json(), "trials_an_hour": sheet.trials_an_hour}
+    (out / "result.json").write_text(json.dumps(result, indent=1))
+    if as_json:
+        console.print_json(json.dumps(result))
+        return
+    _show(found, f"{game} on {backend}")
+    console.print(f"{sheet.trials_an_hour:.0f} trials an hour; files: {out}")
+
+
+def _play(
+    drivers: dict[str, list[Driver]],
+    game: str,
+    keywords: Keywords,
+    starts: int,
+    plan: Callable[[list[int]], TrialPlan],
+    out: Path,
+) -> TrialSheet:
+    """Play the trials of a plan from starts that are spread; return the sheet."""
+    from marl_airhockey.evaluation.evaluate import build_driven_world
+    from marl_airhockey.evaluation.trial_sheet import TrialSheet
+    from marl_airhockey.evaluation.trials import (
+        play_trials,
+        spread_starts,
+        write_starts,
+    )
+
+    first = next(iter(drivers.values()))[0]
+    world = build_driven_world(first, game, 1, keywords)
+    try:
+        chosen = spread_starts(world, starts)
+        sheet = TrialSheet(out, plan(chosen))
+        write_starts(world, chosen, out / STARTS)
+        with bar() as progress:
+            task = progress.add_task(game, total=len(sheet.plan.trials), note="")
+            play_trials(
+                *(world, sheet, drivers),
+                lambda done: progress.update(task, completed=done),
+            )
+    finally:
+        world.close()
+    return sheet
+
+
+def _on_table(text: str, backend: str) -> str:
+    """Return METHOD=POLICY with the policy that is for the table."""
+    method, equals, policy = text.rpartition("=")
+    return method + equals + name_on_table(policy, backend)
+
+
+def _methods(texts: list[str]) -> dict[str, list[str]]:
+    """Return policies by the names of their methods.
+
+    Raises:
+        ValueError: a policy that is there twice.
+    """
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        method, _, policy = text.rpartition("=")
+        method = method or policy
+        if policy in found.setdefault(method, []):
+            raise ValueError(f"{text}: it is there twice")
+        found[method].append(policy)
+    return found
+
+
+def _show(found: Comparison, title: str) -> None:
+    """Print methods, and the differences between them."""
+    table = Table("method", title=title)
+    for name in ("policies", "trials", "interrupted", "success (95 %)"):
+        table.add_column(name, justify="right")
+    table.add_column("return (95 %)", justify="right")
+    for row in found.methods:
+        table.add_row(
+            row.name,
+            *(str(row.policies), str(row.trials), str(row.interrupted)),
+            *_values(row),
+        )
+    for gap in found.differences:
+        table.add_row(
+            f"{gap.first} - {gap.second}",
+            *("", "", ""),
+            *_values(gap),
+        )
+    console.print(table)
+
+
+def _values(row: Estimates) -> list[str]:
+    """Return success and return of a row, with their intervals."""
+    success = row.success, row.success_interval
+    returns = row.returns, row.returns_interval
+    return [f"{v:.3f} ({low:.2f}..{high:.2f})" for v, (low, high) in (success, returns)]

@@ -1,0 +1,74 @@
+"""Replay: what a page is sent to show a recorded episode."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.recording import RecordedEpisode, Recording, read_recording
+from marl_airhockey.data.columns import memories_of, scenario_of, states_of
+from marl_airhockey.play.messages import description, drawn, events
+
+
+def one_episode(path: Path, number: int = 0) -> tuple[Recording, RecordedEpisode]:
+    """Read a recording and return one of its episodes, which has steps.
+
+    Raises:
+        ValueError: no recording, or no such episode in it.
+    """
+    recording = read_recording(path)
+    if not 0 <= number < len(recording.episodes):
+        raise ValueError(
+            f"{path}: there is no episode {number}, but {len(recording.episodes)}"
+        )
+    episode = recording.episodes[number]
+    if not len(episode):
+        raise ValueError(f"{path}: there are no steps in it")
+    return recording, episode
+
+
+def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
+    """Return all that a page needs to show an episode of a recording.
+
+    ``meta`` describes the table and who plays, ``steps`` are frames as a live match
+    has them, the one before the first step included, ``end`` says how it ended.
+
+    Raises:
+        ValueError: no recording, no such episode, or one of another version.
+    """
+    recording, episode = one_episode(path, number)
+    scenario, head = scenario_of(recording), recording.head
+    try:
+        steps = frames_of(episode, scenario)
+    except (ValueError, KeyError, IndexError) as error:
+        raise ValueError(f"{path}: episode {number}: {error}") from error
+    seconds = head["max_cycles"] * head["control_dt"]
+    return {
+        "meta": {
+            "match": description(scenario, seconds),
+            "control_dt": head["control_dt"],
+            "players": head.get("players", []),
+        },
+        "steps": steps,
+        "end": episode.end,
+    }
+
+
+def frames_of(episode: RecordedEpisode, scenario: Scenario) -> list[dict[str, Any]]:
+    """Return the frames (T + 1) of an episode, as `LiveMatch.state` has them."""
+    states, memories = states_of(episode, scenario), memories_of(episode)
+    seats = len(scenario.scene.seats)
+    none = np.zeros((1, seats))
+    returns = np.concatenate([none, episode.columns["returns"]])
+    success = np.concatenate([none, episode.columns["success"]]) > 0
+    frames = []
+    for n in range(len(episode) + 1):
+        state = states.map(lambda x, n=n: x[n])  # type: ignore[misc]
+        memory = {name: value[n] for name, value in memories.items()}
+        row = drawn(scenario, state, memory, returns[n], success[n])
+        notes = {"phase": "play", "n": n, "time_left": 0.0, "reason": ""}
+        frames.append({**notes, **row, "events": events(state) if n else []})
+    return frames
