@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.laws import bounce, fly, wall_restitution
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 STEP = 0.01
@@ -154,7 +154,7 @@ class Estimator:
         )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _update(
     worlds: Array,
     seen: Array,
@@ -189,7 +189,7 @@ def _update(
             shown[w, p] = ahead
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _correct(
     mean: Array, spread: Array, seen: Array, since: float, doubted: bool, noise: float
 ) -> bool:
@@ -215,7 +215,7 @@ def _correct(
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _predict(
     mean: Array,
     spread: Array,
@@ -262,7 +262,7 @@ def _predict(
         _meet(mean, spread, paddles, back, known)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _meet(
     mean: Array, spread: Array, paddles: Array, back: float, known: Surroundings
 ) -> None:

@@ -7,16 +7,16 @@ Where they come from: two real tables, see the documentation of the physics.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.parameters import PUCK_SPEED_CAP, SLOWEST_BOUNCE
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 Motion = tuple[float, float, float, float]
 """Distance along x and y, m, and velocity after it, m/s."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def fly(
     vx: float, vy: float, h: float, gx: float, gy: float, damping: float, drag: float
 ) -> Motion:
@@ -40,7 +40,7 @@ def fly(
     return fly_slowed(vx, vy, h, time, gx, gy, damping, drag)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def fly_slowed(
     vx: float,
     vy: float,
@@ -66,7 +66,7 @@ def fly_slowed(
     return ux * way, uy * way, ux * left + 0.5 * gx * h, uy * left + 0.5 * gy * h
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def slide(vx: float, vy: float, h: float, gx: float, gy: float, grip: float) -> Motion:
     """Return the motion of a block in h s, which Coulomb friction stops and holds.
 
@@ -88,7 +88,7 @@ def slide(vx: float, vy: float, h: float, gx: float, gy: float, grip: float) -> 
     return (vx + wx * left) * time, (vy + wy * left) * time, wx * left, wy * left
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def cap(vx: float, vy: float) -> float:
     """Return the share of a puck's velocity that the cap on its speed leaves."""
     square = vx * vx + vy * vy
@@ -97,7 +97,7 @@ def cap(vx: float, vy: float) -> float:
     return float(PUCK_SPEED_CAP / np.sqrt(square))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def wall_restitution(speed: float, at_one: float, slope: float) -> float:
     """Return the restitution at a wall, at a normal speed in m/s.
 
@@ -110,7 +110,7 @@ def wall_restitution(speed: float, at_one: float, slope: float) -> float:
     return float(min(max(share, 0.0), 1.0))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def impulse(
     speed: float,
     slip: float,
@@ -138,7 +138,7 @@ def impulse(
     return normal, min(max(-slip / tangential_mass, -most), most)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def bounce(
     puck: Array,
     nx: float,

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.seat import ReachPlanes
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
@@ -82,7 +82,7 @@ def limits_stage(
     return Stage(_limit, arguments, stops=True)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _limit(
     action: Array,
     prescribed: Array,
@@ -181,7 +181,7 @@ def _limit(
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _within(wx: float, wy: float, dx: float, dy: float, most: float) -> float:
     """Return the largest share s in 0..1 with |(dx, dy) + s (wx, wy)| <= most."""
     a = max(wx * wx + wy * wy, 1e-18)

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -22,7 +24,7 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 _30, _27, _31, _11 = (np.uint64(n) for n in (30, 27, 31, 11))
 
 
-@njit(cache=True)
+@compiled()
 def mix(z: Any) -> Any:
     """Return the hash of a 64-bit number."""
     z = (z ^ (z >> _30)) * _MIX_1
@@ -30,7 +32,7 @@ def mix(z: Any) -> Any:
     return z ^ (z >> _31)
 
 
-@njit(cache=True)
+@compiled()
 def _begin(
     keys: Array, counts: Array, rows: Array, seeds: Array, episodes: Array, salts: Array
 ) -> None:
@@ -42,7 +44,7 @@ def _begin(
             counts[k, row] = 0
 
 
-@njit(cache=True)
+@compiled()
 def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
     """Fill ``out`` (W, n) with numbers in [0, 1)."""
     for i in range(len(rows)):
@@ -51,6 +53,34 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
             bits = mix(key + (count + np.uint64(k + 1)) * GOLDEN)
             out[i, k] = (bits >> _11) * 2.0**-53
         counts[rows[i]] = count + np.uint64(n)
+
+
+def _is_seed(value: Any) -> bool:
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    return whole and 0 <= value < 2**64
+
+
+def seeds_of(seed: int | Sequence[int], worlds: int) -> Array:
+    """Return the seeds (worlds,) uint64 that a caller's seed means.
+
+    Args:
+        seed: World i gets seed + i (modulo 2^64), or the i-th of a sequence.
+        worlds: Number of worlds.
+
+    Raises:
+        ValueError: It is no whole number from 0 to 2^64 - 1, nor one for each world.
+    """
+    # As objects, since a list of large and small numbers would become floats.
+    given = np.array(seed, object)
+    whole = all(_is_seed(x) for x in given.flat)
+    if not whole or given.shape not in ((), (worlds,)):
+        raise ValueError(
+            f"seed: {seed!r} is no whole number from 0 to 2^64 - 1, nor one for each "
+            f"of {worlds} worlds"
+        )
+    if given.ndim:
+        return given.astype(np.uint64)
+    return np.uint64(int(given)) + np.arange(worlds, dtype=np.uint64)
 
 
 class RandomStreams:

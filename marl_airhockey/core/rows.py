@@ -5,12 +5,13 @@ numpy's own index costs as much for a hundred rows as these for a dozen arrays.
 
 from __future__ import annotations
 
-from numba import literal_unroll, njit
+from numba import literal_unroll
 
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
-@njit(cache=True)
+@compiled()
 def copy_rows(worlds: Array, pairs: tuple[tuple[Array, Array], ...]) -> None:
     """Copy rows (W, n) into those of some worlds (B, n), one array after the other."""
     for pair in literal_unroll(pairs):
@@ -20,7 +21,7 @@ def copy_rows(worlds: Array, pairs: tuple[tuple[Array, Array], ...]) -> None:
                 into[worlds[i], k] = rows[i, k]
 
 
-@njit(cache=True)
+@compiled()
 def clear_rows(worlds: Array, arrays: tuple[Array, ...]) -> None:
     """Set the rows of some worlds to 0 in arrays (B, n)."""
     for array in literal_unroll(arrays):

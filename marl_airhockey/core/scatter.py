@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.parameters import SLOWEST_BOUNCE
 from marl_airhockey.core.rng import GOLDEN, mix
+from marl_airhockey.jit.cache import compiled
 
 TAIL, WIDER = 0.05, 5.0
 """Share of bounces whose exit scatters more, and how much more: one table's records."""
@@ -21,7 +21,7 @@ _UNIT = 2.0**-53
 _11 = np.uint64(11)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def draw(key: np.uint64, number: int, place: int) -> tuple[float, float, float]:
     """Return two standard normal numbers and one in [0, 1) of a contact.
 
@@ -38,7 +38,7 @@ def draw(key: np.uint64, number: int, place: int) -> tuple[float, float, float]:
     return radius * math.cos(phase), radius * math.sin(phase), units[2]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def at_wall(
     luck: tuple[float, float, float], speed: float, e: float, sd: float, exit_sd: float
 ) -> tuple[float, float]:
@@ -56,7 +56,7 @@ def at_wall(
     return min(max(e + sd * luck[0], 0.0), 1.0), wide * exit_sd * luck[1] * share
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def at_paddle(
     luck: tuple[float, float, float], e: float, sd: float, spin_sd: float
 ) -> tuple[float, float]:

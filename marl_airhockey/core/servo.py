@@ -8,9 +8,9 @@ limits and the physics.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.seat import ReachPlanes
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
@@ -48,7 +48,7 @@ def servo_stage(
     return Stage(_lag, (*given, dt, action))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _lag(
     before: Array,
     after: Array,
@@ -84,7 +84,7 @@ def _lag(
                 action[b, s, axis] = along / top_speed[b]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def follow_ramp(
     before: float,
     after: float,

@@ -1,26 +1,25 @@
 """Code generator: writes a tape as a loop over worlds and compiles it with numba.
 
-The sources are kept in the user's cache folder, with numba's compiled code beside
+The sources are kept in the folder of compiled code (`cache`), with what numba makes of
 them, so that a loop is compiled once per machine.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping
-from functools import cache
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba.core.dispatcher import Dispatcher
 
+from marl_airhockey.jit.cache import code_folder, compiled, one_process
 from marl_airhockey.jit.tracer import Symbol, Tape
 from marl_airhockey.types import Array
 
@@ -185,57 +184,46 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
     """
     digest = hashlib.sha256(source.encode()).hexdigest()[:24]
     if digest not in _loaded:
-        path = cache_folder() / f"loop_{digest}.py"
-        if not path.exists():
-            if time.monotonic() - _compiled.get(name, -np.inf) > PAUSE:
-                print(f"marl_airhockey: compiling {name} once", file=sys.stderr)
-            part = path.with_suffix(f".{os.getpid()}")
-            part.write_text(source)
-            part.replace(path)
-        spec = importlib.util.spec_from_file_location(path.stem, path)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        # The module must be importable when numba loads a loop from its cache.
-        sys.modules[path.stem] = module
-        spec.loader.exec_module(module)
-        vars(module).update(names or {})
-        compiled = njit(module.SIGNATURE, cache=True, nogil=True, error_model="numpy")
-        _loaded[digest] = Loaded(compiled(module.kernel), module)
-        _compiled[name] = time.monotonic()
+        path = code_folder() / f"loop_{digest}.py"
+        if path.exists():
+            _loaded[digest] = _compile(source, path, names)
+        else:
+            # Another process that needs it too waits, and then finds it.
+            with one_process(path.stem):
+                _compile_first(source, path, name, names)
     return _loaded[digest]
+
+
+def _compile_first(
+    source: str, path: Path, name: str, names: Mapping[str, Any] | None
+) -> None:
+    """Compile a module that was not in the cache, and write its source there."""
+    digest = path.stem.removeprefix("loop_")
+    if not path.exists() and time.monotonic() - _compiled.get(name, -np.inf) > PAUSE:
+        print(f"marl_airhockey: compiling {name} once", file=sys.stderr)
+    _loaded[digest] = _compile(source, path, names)
+    _compiled[name] = time.monotonic()
+    # The source comes last: where it is, its compiled code is, too.
+    with suppress(OSError):
+        part = path.with_suffix(f".{os.getpid()}")
+        part.write_text(source)
+        part.replace(path)
+
+
+def _compile(source: str, path: Path, names: Mapping[str, Any] | None) -> Loaded:
+    """Return a module, compiled or taken from the cache."""
+    module = ModuleType(path.stem)
+    # The module must be importable when numba takes a loop from its cache.
+    sys.modules[path.stem] = module
+    exec(compile(source, str(path), "exec"), vars(module))
+    vars(module).update(names or {})
+    kernel = compiled(nogil=True, error_model="numpy")(module.kernel)
+    if isinstance(kernel, Dispatcher):
+        kernel.compile(module.SIGNATURE)
+        kernel.disable_compile()
+    return Loaded(kernel, module)
 
 
 PAUSE = 2.0
 """Time after a compilation (s) from which the next one of its name is announced."""
 _compiled: dict[str, float] = {}
-
-
-CALLED = ("backends", "contracts", "core", "jit")
-"""Folders of the functions that compiled stages call: backends, what they import."""
-
-
-@cache
-def package_hash() -> str:
-    """Return the hash of the sources in `CALLED`, a key of code that calls them.
-
-    Others can change, say by a scenario more, without a minute of compiling.
-    """
-    package = Path(__file__).parents[1]
-    files = sorted(path for name in CALLED for path in (package / name).rglob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
-
-
-@cache
-def cache_folder() -> Path:
-    """Return the folder of compiled loops: MARL_AIRHOCKEY_CACHE or the user's cache."""
-    given = os.environ.get("MARL_AIRHOCKEY_CACHE")
-    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    folder = Path(given) if given else Path(home) / "marl_airhockey"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    return Path(tempfile.mkdtemp(prefix="marl_airhockey-"))

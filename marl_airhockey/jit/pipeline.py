@@ -19,7 +19,7 @@ from numba.core import cgutils
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
-from marl_airhockey.jit.codegen import load, package_hash
+from marl_airhockey.jit.codegen import load
 from marl_airhockey.jit.threads import LEAST, over_rows
 from marl_airhockey.types import Array
 
@@ -160,8 +160,6 @@ def _source(stages: Sequence[Stage]) -> str:
         calls += [f"if not {call}:", "    return False"] if stage.stops else [call]
     lines = [
         '"""Written by marl_airhockey.jit.pipeline; may be deleted at any time."""',
-        # The cached code of a pipeline holds the code of the functions that it calls.
-        f"# {package_hash()}",
         *(f"# f{i}: {_called(stage.function)}" for i, stage in enumerate(stages)),
         "import numpy as np",
         "from numba import carray",

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.jit.codegen import cache_folder
+from marl_airhockey.jit.cache import cache_folder
 from marl_airhockey.lab.arm_process import run_arm
 from marl_airhockey.lab.faults import ARM_FAULTS, FAULTS
 from marl_airhockey.lab.hand_process import path_of, run_hand

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.laws import bounce
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.toolkit.starts import falling_puck, redraw, roll
 from marl_airhockey.types import Array
 
@@ -124,7 +124,7 @@ def _strike(
     return struck, legal & _hit(struck, normal, push, *laws)
 
 
-@njit(cache=True)
+@compiled()
 def _hit(
     puck: Array, normal: Array, push: Array, restitution: Array, friction: Array
 ) -> Array:
@@ -144,7 +144,7 @@ def _hit(
     return met
 
 
-@njit(cache=True)
+@compiled()
 def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
     """Choose a valid index of each rising path (W, T, 4); -1 if there is none."""
     steep = np.tan(np.radians(30.0))

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from functools import cache
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.core.laws import fly, impulse, wall_restitution
@@ -15,6 +14,7 @@ from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.core.table import GRAVITY
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)
@@ -60,14 +60,14 @@ def falling_puck(rng: RandomStreams) -> Array:
     return puck
 
 
-@njit(cache=True)
+@compiled()
 def _spin(puck: Array) -> None:
     """Multiply the last of five columns, a share of the puck's speed, by it."""
     for w in range(len(puck)):
         puck[w, 4] *= math.sqrt(puck[w, 2] ** 2 + puck[w, 3] ** 2)
 
 
-@njit(cache=True)
+@compiled()
 def _drop(
     puck: Array, body: int, position: Array, velocity: Array, edge: Array
 ) -> None:
@@ -135,7 +135,7 @@ SIDESTEPS = 12
 """Number of places that are tried on each side, 2 cm apart."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _serve(
     position: Array,
     velocity: Array,
@@ -209,7 +209,7 @@ def roll(
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _roll(start: Array, h: float, half: float, laws: Array, out: Array) -> None:
     """Fill ``out`` (W, T, 5) for ``start`` (W, 5)."""
     for w in range(len(out)):

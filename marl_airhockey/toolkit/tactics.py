@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import unknown_name
@@ -17,6 +16,7 @@ from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
 from marl_airhockey.core.reckoning import Walls, reckon
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
@@ -144,7 +144,7 @@ STEP, HORIZON = 0.05, 1.2
 """Time step and horizon of the prediction of a puck's path (s)."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _moved(
     x: float,
     y: float,
@@ -167,7 +167,7 @@ def _moved(
     return x + vx * time, y + vy * time
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slide_on(
     place: Array,
     motion: Array,
@@ -185,7 +185,7 @@ def _slide_on(
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _find_strike(
     place: Array,
     motion: Array,

@@ -11,7 +11,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.parameters import SCATTER
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.rng import RandomStreams, StreamSet
+from marl_airhockey.core.rng import RandomStreams, StreamSet, seeds_of
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
@@ -71,7 +71,7 @@ class World:
         show, exact = self.observer.show, backend.ideal
         self.referee = Referee(scenario, self.reach.rotation, show, exact)
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
-        self._seeded, self.seeds = False, np.zeros(b, np.int64)
+        self._seeded, self.seeds = False, np.zeros(b, np.uint64)
         """(B,) seed of each world"""
         self._scatters = physics.any_of(*SCATTER)
         contact = ("contact",) if self._scatters else ()
@@ -169,17 +169,12 @@ class World:
                 the system.
 
         Raises:
-            ValueError: neither a whole number nor one for each world.
+            ValueError: neither a whole number nor one for each world, or not one from
+                0 to 2^64 - 1.
         """
         if seed is None:
             seed = int(np.random.SeedSequence().generate_state(1)[0])
-        b, given = self.num_worlds, np.asarray(seed)
-        if given.dtype.kind not in "iu" or given.shape not in ((), (b,)):
-            raise ValueError(
-                f"seed: {seed!r} is no whole number, nor one for each of {b}"
-            )
-        alone = given.ndim == 0
-        self.seeds = (given + np.arange(b) if alone else given).astype(np.int64)
+        self.seeds = seeds_of(seed, self.num_worlds)
         self._episode.number[:] = 0
         self._seeded = True
 

@@ -229,11 +229,23 @@ def test_seeds_are_one_number_or_one_for_each_world():
         assert world.seeds.tolist() == [5, 9, 2]
     world.reset(7)
     assert world.seeds.tolist() == [7, 8, 9]
-    for wrong in ("a", 1.5, [1, 2], np.zeros((3, 1), int)):
-        with pytest.raises(
-            ValueError, match="is no whole number, nor one for each of 3"
-        ):
-            world.reset(wrong)
+    for seed in ("a", 1.5, True, [1, 2], np.zeros((3, 1), int), -1, 2**64, [0, 1, -1]):
+        with pytest.raises(ValueError, match=r"is no whole number from 0 to 2\^64 - 1"):
+            world.reset(seed)
+
+
+def test_large_seeds_are_seeds_of_their_own():
+    large = (0, 2**53, 2**53 + 1, 2**63 - 1, 2**63, 2**63 + 1, 2**64 - 1)
+    world = ah.make_world("reach", 1)
+    starts = {world.reset(seed).tobytes() for seed in large}
+    assert len(starts) == len(large)
+    many = ah.make_world("reach", 3)
+    for seed in (2**63 - 2, 2**64 - 2, [2**63, 5, 2**64 - 1]):
+        many.reset(seed)
+        own = seed if isinstance(seed, list) else [(seed + i) % 2**64 for i in range(3)]
+        assert many.seeds.tolist() == own
+        for row, start in zip(own, many.observation(), strict=True):
+            np.testing.assert_array_equal(world.reset(row)[0], start)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from marl_airhockey.jit.codegen import cache_folder
+from marl_airhockey.jit.cache import cache_folder
 from marl_airhockey.lab.lab import LabClient, port_file
 
 OPEN = """

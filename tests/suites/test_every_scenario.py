@@ -29,7 +29,7 @@ from marl_airhockey.core.state import ARRAYS
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import gymnasium_id
 
-FLOORS = {"still": 0.01, "random": 0.10, "sticky": 0.10}
+CHANCE = {"still": 0.02, "random": 0.10, "sticky": 0.10}
 
 
 def alone(scenario):
@@ -215,17 +215,15 @@ def test_rewards_are_the_sum_of_their_terms(scenario, backend):
             break
 
 
-@pytest.mark.parametrize("driver", list(FLOORS))
-def test_luck_does_not_succeed(single, driver):
+@pytest.mark.parametrize("driver", list(CHANCE))
+def test_chance_level_is_low(single, driver):
     # A matter of the rules, not of the backend: backends agree, as other tests show.
     result = evaluate(ah.make_agent(driver), driver, single, 400, 0, {})
     if single == "touch":
         # A falling puck meets a still paddle one time in four.
         assert 0.15 < result.success < 0.40
     else:
-        # Three standard deviations of 400 episodes above the rule.
-        bar = FLOORS[driver]
-        assert result.success <= bar + 3 * np.sqrt(bar * (1 - bar) / 400)
+        assert result.success <= CHANCE[driver]
 
 
 @pytest.mark.compiles_much

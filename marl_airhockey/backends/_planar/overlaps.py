@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends._planar.walls import depth_in_side
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 SLOP = 2e-4
@@ -14,7 +14,7 @@ PUSHES = 6
 """Number of sweeps in which pucks alone give way; then paddles do."""
 
 
-@njit(cache=True)
+@compiled()
 def give_way(
     position: Array,
     velocity: Array,

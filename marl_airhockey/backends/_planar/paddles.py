@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.contracts.backend import MAX_PRESCRIBED_SPEED
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def follow(
     velocity: Array,
     prescribed: Array,
@@ -49,7 +49,7 @@ def follow(
             raised[b, i] |= speed > MAX_PRESCRIBED_SPEED
 
 
-@njit(cache=True)
+@compiled()
 def ramp_paddles(
     position: Array,
     velocity: Array,
@@ -91,7 +91,7 @@ def ramp_paddles(
     return overlap
 
 
-@njit(cache=True)
+@compiled()
 def separate_paddles(
     position: Array, velocity: Array, prescribed: Array, raised: Array, diameter: float
 ) -> bool:
@@ -143,7 +143,7 @@ def separate_paddles(
     return overlap
 
 
-@njit(cache=True)
+@compiled()
 def keep_in_reach(
     position: Array, velocity: Array, held: Array, normals: Array, offsets: Array
 ) -> bool:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
@@ -26,7 +26,7 @@ def sides(scene: Scene) -> Array:
     return np.array(rows)
 
 
-@njit(cache=True)
+@compiled()
 def depth_in_side(lines: Array, s: int, radius: float, x: float, y: float) -> float:
     """Return how deep a disc is in the wall of side ``s`` of `sides`, m."""
     nx, ny = lines[s, 0], lines[s, 1]

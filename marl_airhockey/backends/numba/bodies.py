@@ -6,9 +6,9 @@ They are rows of one array, as numba counts references to every array of a world
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.numba.geometry import distance_to_fixed, distance_to_point
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 X, Y, VX, VY, SPIN, ANGLE, RADIUS, MASS, EDGE = range(9)
@@ -31,7 +31,7 @@ SLOP = 2e-4
 """Overlap that is left alone (m)."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def hide_constant(value: int) -> int:
     """Return an integer that numba does not take for a constant.
 
@@ -40,7 +40,7 @@ def hide_constant(value: int) -> int:
     return int(np.int64(value))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def distance_between(
     m: Array, i: int, j: int, walls: Array, obstacles: Array
 ) -> tuple[float, float, float]:
@@ -53,7 +53,7 @@ def distance_between(
     return gap - m[i, RADIUS] - m[j, RADIUS], nx, ny
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def closing(m: Array, at: int, i: int, j: int, nx: float, ny: float) -> float:
     """Return the normal speed of j from i, m/s; ``at`` is the column of velocities."""
     speed = nx * m[j, at] + ny * m[j, at + 1]
@@ -62,7 +62,7 @@ def closing(m: Array, at: int, i: int, j: int, nx: float, ny: float) -> float:
     return float(speed)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def fixed_range(
     m: Array, role: Array, j: int, held: int, edges: int, end: int
 ) -> tuple[int, int]:
@@ -84,7 +84,7 @@ def fixed_range(
     return (j * edges, (j + 1) * edges) if is_held else (0, 0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def partner(place: int, j: int, low: int) -> int:
     """Return what comes at a place in the list of all that body j can touch.
 
@@ -93,13 +93,13 @@ def partner(place: int, j: int, low: int) -> int:
     return place if place < j else -1 - (low + place - j)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def slop(role: Array, i: int, j: int) -> float:
     """Return the overlap of body j with i that is left alone, m: none with an edge."""
     return 0.0 if i < 0 and role[j] <= PRESCRIBED else SLOP
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def shares(
     m: Array, role: Array, i: int, j: int, stops: bool
 ) -> tuple[float, float, float, float]:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.numba.arrays import (
     BLOCK_E,
@@ -76,11 +75,12 @@ from marl_airhockey.backends.numba.overlaps import keep_in_reach, take_apart
 from marl_airhockey.contracts.backend import PATIENCE
 from marl_airhockey.core.laws import cap, wall_restitution
 from marl_airhockey.core.scatter import at_paddle, at_wall, draw
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None:
     """Move the worlds in which something may meet, from contact to contact.
 

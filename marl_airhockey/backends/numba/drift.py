@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.numba.arrays import (
     BLOCK_GRIP,
@@ -54,6 +53,7 @@ from marl_airhockey.backends.numba.impacts import (
 )
 from marl_airhockey.backends.numba.near import BOW, list_near_drift
 from marl_airhockey.core.laws import fly, slide
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 REFINEMENTS = 5
@@ -62,7 +62,7 @@ LATER = 1.1
 """Share of a chord, a little beyond its end, up to which a touch is looked for."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def drift(
     m: Array,
     role: Array,
@@ -158,7 +158,7 @@ def drift(
     return h, stale
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _longest_slide(m: Array, pairs: Array, contacts: Array, n: int) -> float:
     """Return the longest drift in which discs that slide on each other part by `BOW`.
 
@@ -175,7 +175,7 @@ def _longest_slide(m: Array, pairs: Array, contacts: Array, n: int) -> float:
     return float(longest)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> None:
     """Fill the mean and last velocities of a drift without contacts."""
     for i in range(len(m)):
@@ -197,7 +197,7 @@ def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> No
         m[i, DX], m[i, DY] = m[i, CX], m[i, CY]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def _first_touch(
     m: Array,
     role: Array,
@@ -247,7 +247,7 @@ def _first_touch(
     return first
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _touch_fixed(
     m: Array, j: int, f: int, walls: Array, obstacles: Array, h: float, most: float
 ) -> float:

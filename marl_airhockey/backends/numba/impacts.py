@@ -9,7 +9,6 @@ The hardest-first order makes the result independent of the order of the bodies.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.numba.bodies import (
     ASKS,
@@ -30,6 +29,7 @@ from marl_airhockey.backends.numba.bodies import (
     shares,
 )
 from marl_airhockey.core.laws import impulse
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 NX, NY, RESTITUTION, FRICTION, KICK = range(5)
@@ -50,7 +50,7 @@ MULTIPLE = 3.0
 """A contact leaves no puck faster than the fastest body before, times this."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def strike(
     m: Array,
     at: int,
@@ -92,7 +92,7 @@ def strike(
         m[i, at + 1] -= wi * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def scatter(
     m: Array, at: int, i: int, j: int, nx: float, ny: float, kick: float
 ) -> None:
@@ -105,7 +105,7 @@ def scatter(
         m[j, SPIN] += kick * speed / m[j, RADIUS]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _hardest(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int, kind: int
 ) -> int:
@@ -125,7 +125,7 @@ def _hardest(
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def solve(
     m: Array,
     role: Array,
@@ -198,7 +198,7 @@ def solve(
             m[i, HELD] = m[i, INSIDE]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
     """Let nothing close in the coming drift; return True if that was found.
 
@@ -231,7 +231,7 @@ def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _stop_paddles_at_paddles(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int
 ) -> None:
@@ -245,7 +245,7 @@ def _stop_paddles_at_paddles(
         strike(m, at, i, j, contact, shares(m, role, i, j, False))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _stop_paddles(
     m: Array,
     role: Array,

@@ -7,7 +7,6 @@ contact to contact (`busy`).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends._planar.paddles import follow
 from marl_airhockey.backends.numba.arrays import (
@@ -21,6 +20,7 @@ from marl_airhockey.backends.numba.bodies import BODY
 from marl_airhockey.backends.numba.busy import advance_busy
 from marl_airhockey.backends.numba.flight import block_space, fly_freely
 from marl_airhockey.backends.numba.impacts import CONTACT
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
@@ -36,7 +36,7 @@ def work_space(static: Static, worlds: int) -> tuple[Array, Array]:
     return np.zeros((worlds, floats)), np.zeros((worlds, movers + 5 * size), np.int64)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def advance(
     paddles: int,
     pucks: int,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.numba.arrays import PULL
 from marl_airhockey.backends.numba.bodies import (
@@ -28,13 +27,14 @@ from marl_airhockey.backends.numba.bodies import (
     partner,
 )
 from marl_airhockey.backends.numba.geometry import RELEASE
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 BOW = 3e-4
 """Distance of a curved way from its chord that a drift may have (m)."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def list_near(
     m: Array,
     role: Array,
@@ -107,7 +107,7 @@ def list_near(
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def list_near_drift(
     m: Array,
     role: Array,
@@ -132,7 +132,7 @@ def list_near_drift(
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@compiled(nogil=True, error_model="numpy", forceinline=True)
 def longest_drift(m: Array, role: Array, near: Array, count: int) -> float:
     """Return the longest drift whose chords are true to `BOW`, s."""
     bend = 0.0

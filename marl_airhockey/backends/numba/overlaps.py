@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from marl_airhockey.backends.numba.bodies import (
     AWAY,
     HELD,
@@ -18,10 +16,11 @@ from marl_airhockey.backends.numba.bodies import (
     slop,
 )
 from marl_airhockey.backends.numba.geometry import distance_to_fixed
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def take_apart(
     m: Array, role: Array, walls: Array, obstacles: Array, held: int, edges: int
 ) -> None:
@@ -65,7 +64,7 @@ def take_apart(
             return
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def keep_in_reach(m: Array, walls: Array, paddles: int, edges: int) -> None:
     """Move paddles that could get out of their reaches back to the edge."""
     for j in range(paddles):

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.robosuite.cholesky import factor, solve
 from marl_airhockey.core.parameters import PARAMETERS
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 
@@ -45,7 +45,7 @@ class Gains:
         return np.array(astuple(self))
 
 
-@njit(cache=True)
+@compiled()
 def torques(
     jacobian: Array,
     drift: Array,
@@ -97,7 +97,7 @@ def torques(
     return _fit(jacobian, bias, contact, motion, low, high, out)
 
 
-@njit(cache=True)
+@compiled()
 def _velocity(twist: Array, table: Array) -> Array:
     """Return the velocity (3,) of the foot in the table frame, m/s."""
     velocity = np.zeros(3)
@@ -107,7 +107,7 @@ def _velocity(twist: Array, table: Array) -> Array:
     return velocity
 
 
-@njit(cache=True)
+@compiled()
 def _plane_acceleration(
     twist: Array,
     position: Array,
@@ -130,7 +130,7 @@ def _plane_acceleration(
         out[i] = table[i, 0] * ax + table[i, 1] * ay
 
 
-@njit(cache=True)
+@compiled()
 def _contact_acceleration(
     twist: Array,
     drift: Array,
@@ -160,7 +160,7 @@ def _contact_acceleration(
         out[3 + i] = gains[4] * off - damp * twist[3 + i] - drift[3 + i]
 
 
-@njit(cache=True)
+@compiled()
 def _to_forces(jacobian: Array, mass: Array, first: Array, second: Array) -> None:
     """Multiply two accelerations (6,) by the inertia at the foot, in place.
 
@@ -182,7 +182,7 @@ def _to_forces(jacobian: Array, mass: Array, first: Array, second: Array) -> Non
     solve(mobility, second)
 
 
-@njit(cache=True)
+@compiled()
 def _fit(
     jacobian: Array,
     bias: Array,
@@ -220,7 +220,7 @@ def _fit(
     return share
 
 
-@njit(cache=True)
+@compiled()
 def subtract_payload(
     load: float,
     gravity: Array,

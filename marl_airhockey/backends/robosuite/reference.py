@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 MAX_LEAD = 0.02
 """Largest distance of the reference from the paddle (m)."""
 
 
-@njit(cache=True)
+@compiled()
 def reference_motion(
     start: Array, old: Array, new: Array, period: float, elapsed: float, out: Array
 ) -> None:

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.core.laws import cap, impulse, wall_restitution
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 MASS, GRIP, PULL_X, PULL_Y, DRAG, DAMPING = range(6)
@@ -60,7 +60,7 @@ class Sliding(NamedTuple):
     """Speeds at which pucks came to the sides (pucks, sides), m/s; persists"""
 
 
-@njit(cache=True)
+@compiled()
 def apply_laws(
     sliding: Sliding,
     paddles: Array,
@@ -105,7 +105,7 @@ def apply_laws(
     _set_restitutions(sliding, places, speeds)
 
 
-@njit(cache=True)
+@compiled()
 def _rub(
     sliding: Sliding, i: int, paddles: Array, places: Array, speeds: Array
 ) -> None:
@@ -151,14 +151,14 @@ def _rub(
         speeds[d + 2] -= spins * rub / sliding.radius[1 + other]
 
 
-@njit(cache=True)
+@compiled()
 def _pushes(dx: float, dy: float, nx: float, ny: float, touch: float) -> bool:
     """Return True if a body may push along a normal; (dx, dy) leads from it, m."""
     distance = np.hypot(dx, dy)
     return bool(0.0 < distance < touch + NEAR and nx * dx + ny * dy > SAME * distance)
 
 
-@njit(cache=True)
+@compiled()
 def _set_restitutions(sliding: Sliding, places: Array, speeds: Array) -> None:
     """Set the restitutions of rails for the pucks that are nearest to them."""
     if sliding.laws[SLOPE] == 0.0:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from marl_airhockey.backends.robosuite.mujoco_c import (
     full_mass,
@@ -17,13 +16,14 @@ from marl_airhockey.backends.robosuite.mujoco_c import (
 from marl_airhockey.backends.robosuite.osc import subtract_payload, torques
 from marl_airhockey.backends.robosuite.reference import reference_motion
 from marl_airhockey.backends.robosuite.sliding import apply_laws
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 RELEASE = 0.001
 """Distance from a rail up to which a puck that touched it still does (m)."""
 
 
-@njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def advance(
     sim: Any,
     static: Any,
@@ -71,7 +71,7 @@ def advance(
             _record(sim, output, k + 1)
 
 
-@njit(cache=True)
+@compiled()
 def refresh(sim: Any, static: Any, output: Any) -> None:
     """Update a world's derived arrays, paddles and contacts from its positions."""
     step1(sim.model, sim.data)
@@ -79,7 +79,7 @@ def refresh(sim: Any, static: Any, output: Any) -> None:
     _detect_events(sim, static, output, 0.0)
 
 
-@njit(cache=True)
+@compiled()
 def _command_arm(
     sim: Any,
     static: Any,
@@ -137,7 +137,7 @@ def _command_arm(
     return share
 
 
-@njit(cache=True)
+@compiled()
 def _to_table(static: Any, point: Array) -> Array:
     """Transform a point (3,) from the world to the table frame, m."""
     found = np.zeros(3)
@@ -147,7 +147,7 @@ def _to_table(static: Any, point: Array) -> Array:
     return found
 
 
-@njit(cache=True)
+@compiled()
 def _measure(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> None:
     """Fill the positions and velocities of the paddles, and row k of the trace."""
     for s in range(len(sim.arms)):
@@ -175,7 +175,7 @@ def _measure(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> Non
         row[5] = np.hypot(output.paddles[s, 2], output.paddles[s, 3])
 
 
-@njit(cache=True)
+@compiled()
 def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
     """Detect contacts that begin and goal lines that are crossed, ``elapsed`` s in."""
     near = static.radius[0] + static.radius[1]
@@ -215,7 +215,7 @@ def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
             output.beyond[p, m] = past
 
 
-@njit(cache=True)
+@compiled()
 def _record(sim: Any, output: Any, k: int) -> None:
     """Fill row k of the path."""
     seats = len(sim.arms)

@@ -8,8 +8,8 @@ for the UR5e.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 JOINTS = 6
@@ -25,7 +25,7 @@ DAMPING = 1e-7
 """Damping of the inverse, so that it stays bounded at a singular pose"""
 
 
-@njit(cache=True)
+@compiled()
 def forward(angles: Array) -> tuple[Array, Array]:
     """Return the pose (4, 4) of the flange and its Jacobian (6, 6), base frame."""
     pose = np.eye(4)
@@ -50,7 +50,7 @@ def forward(angles: Array) -> tuple[Array, Array]:
     return pose, jacobian
 
 
-@njit(cache=True)
+@compiled()
 def inverse(pose: Array, guess: Array, iterations: int = 30) -> tuple[bool, Array]:
     """Find the joint angles of a pose (4, 4) that are near a guess (6,).
 
@@ -77,7 +77,7 @@ def inverse(pose: Array, guess: Array, iterations: int = 30) -> tuple[bool, Arra
     return False, angles
 
 
-@njit(cache=True)
+@compiled()
 def joint_speeds(jacobian: Array, twist: Array) -> Array:
     """Return the joints' speeds (6,) that move the flange by a twist (6,)."""
     square = jacobian @ jacobian.T + DAMPING * np.eye(6)
@@ -85,7 +85,7 @@ def joint_speeds(jacobian: Array, twist: Array) -> Array:
     return speeds
 
 
-@njit(cache=True)
+@compiled()
 def matrix_of(vector: Array) -> Array:
     """Return the rotation matrix (3, 3) of a rotation vector (3,)."""
     angle = np.sqrt((vector * vector).sum())
@@ -103,7 +103,7 @@ def matrix_of(vector: Array) -> Array:
     )
 
 
-@njit(cache=True)
+@compiled()
 def vector_of(matrix: Array) -> Array:
     """Return the rotation vector (3,) of a rotation matrix (3, 3)."""
     trace = matrix[0, 0] + matrix[1, 1] + matrix[2, 2]
