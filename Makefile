@@ -1,14 +1,13 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-one test-all test-distributed lint docs clean
+.PHONY: help setup demo check ci test test-one test-all test-distributed lint docs clean
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 FAR := .venv-distributed
 JOBS ?= 2
-# Devices, pages and their users run in real time: nothing runs beside them.
-REALTIME := tests/lab tests/devices tests/play
-TEST = $(BIN)/pytest -n $(JOBS) --dist worksteal $(addprefix --ignore=,$(REALTIME))
+# All that the workers would compile at the same time is compiled before they start.
+TEST = $(BIN)/airhockey warm --jobs $(JOBS) && $(BIN)/pytest -n $(JOBS)
 
 help: ## Show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
@@ -34,14 +33,19 @@ demo: setup ## Train a paddle to juggle and show it (a minute)
 
 test: setup lint ## Run linters, types and the tests that are not slow
 	$(TEST) -m 'not slow'
-	$(BIN)/pytest -m 'not slow' $(REALTIME)
+
+check: setup ## Run linters and tests of what has changed since main
+	$(BIN)/python scripts/check_changes.py
+
+ci: ## Run what CI runs, on a clean clone of the last commit
+	clone=$$(mktemp -d) && git clone --quiet . $$clone/project && \
+		(cd $$clone/project && bash .ci/run); status=$$?; rm -rf $$clone; exit $$status
 
 test-one: setup ## Run the tests of one scenario or driver: make test-one NAME=my_task
 	$(BIN)/pytest tests/suites -m 'not slow' --only $(NAME)
 
 test-all: setup lint ## Run every test
 	$(TEST)
-	$(BIN)/pytest $(REALTIME)
 
 # RLlib pins an older gymnasium, so it has an environment of its own.
 $(FAR)/.ready: pyproject.toml constraints.txt
@@ -49,7 +53,7 @@ $(FAR)/.ready: pyproject.toml constraints.txt
 	sed '/^gymnasium==/d' constraints.txt > $(FAR)/constraints.txt
 	$(FAR)/bin/pip install --quiet --upgrade pip
 	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt torch
-	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt --editable '.[train,distributed]' pytest pytest-timeout
+	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt --editable '.[train,distributed]' pytest pytest-timeout pytest-xdist
 	touch $@
 
 test-distributed: $(FAR)/.ready ## Run the tests of RLlib, in an environment of their own

@@ -1,16 +1,20 @@
 import importlib.util
 import os
 import shutil
+from itertools import product
 from typing import ClassVar
 
 import pytest
 from names import GOALS, ideal_backends, seats
+from xdist.scheduler import LoadScopeScheduling
 
 import marl_airhockey as ah
 from marl_airhockey.registry import plain_agent_names
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("MUJOCO_GL", "egl")
+TOGETHER = ("lab/", "play/test_page.py")
+"""Folder and file whose tests one worker runs: they share an arm, or a browser"""
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
@@ -29,8 +33,8 @@ def pytest_collection_modifyitems(config, items):
     items[:] = kept
 
 
-LARGE = ("doubles", "free_for_all")
-"""Games that take several times as long to compile as all else"""
+KINDS = ("juggle", "move_block", "team_juggle", "free_for_all")
+"""One scenario of each kind: a puck, a block, a team, a polygon"""
 
 
 class _Plain:
@@ -39,8 +43,16 @@ class _Plain:
     params: ClassVar[dict] = {}
 
 
+def _short(scenario, backend="numba", agent="sticky"):
+    """True for the part of all combinations that the short run plays."""
+    return scenario in KINDS or (backend == "numba" and agent == "sticky")
+
+
 def pytest_generate_tests(metafunc):
-    """Every test that asks for a scenario, backend or agent gets all there are."""
+    """Every test that asks for a scenario, backend or agent gets all there are.
+
+    Of combinations with a scenario, the short run plays a part.
+    """
     found = {
         "scenario": ah.scenario_names,
         "single": lambda: [n for n in ah.scenario_names() if seats(n) == 1],
@@ -48,13 +60,37 @@ def pytest_generate_tests(metafunc):
         "agent": plain_agent_names,
         "goal_scenario": lambda: GOALS,
     }
-    for name, names in found.items():
-        if name in metafunc.fixturenames:
-            given = names()
-            if metafunc.definition.get_closest_marker("compiles_much"):
-                large = [pytest.param(n, marks=pytest.mark.slow) for n in LARGE]
-                given = [n for n in given if n not in LARGE] + large
-            metafunc.parametrize(name, given)
+    names = [name for name in found if name in metafunc.fixturenames]
+    rows = []
+    for row in product(*(found[name]() for name in names)):
+        chosen = dict(zip(names, row, strict=True))
+        short = "scenario" not in chosen or _short(**chosen)
+        rows.append(pytest.param(*row, marks=() if short else pytest.mark.slow))
+    if names:
+        metafunc.parametrize(names, rows)
+
+
+class Scheduling(LoadScopeScheduling):
+    """Distribution of single tests over workers, but for those of `TOGETHER`.
+
+    As ``--dist loadgroup`` should; pytest 9.2 hides the groups from xdist 3.8.
+    """
+
+    def _split_scope(self, nodeid):
+        inside = nodeid.removeprefix("tests/")
+        found = [part for part in TOGETHER if inside.startswith(part)]
+        return found[0] if found else nodeid
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return Scheduling(config, log)
+
+
+@pytest.fixture
+def uncompiled(monkeypatch):
+    """Run scenarios as plain numpy, so that scenes of all kinds need no compiling."""
+    monkeypatch.setenv("MARL_AIRHOCKEY_COMPILE", "0")
 
 
 @pytest.fixture(scope="session", autouse=True)

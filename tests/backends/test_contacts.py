@@ -6,6 +6,8 @@ from pressing import overlap, press, press_world
 
 from marl_airhockey.contracts.backend import Command
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 RADIUS = 0.03175
 
 
@@ -35,7 +37,7 @@ MORE_CORNERS = [pytest.param(count, marks=pytest.mark.slow) for count in (4, 5, 
 @pytest.mark.parametrize("limits", ["robot", "arcade"])
 @pytest.mark.parametrize("corners", [3, *MORE_CORNERS])
 def test_nothing_overlaps_in_a_corner(corners, limits, preset):
-    for paddles, pucks in ((1, 1), (2, 1), (1, 2)):
+    for paddles, pucks in ((2, 1), (1, 2)):
         options = {"paddles": paddles, "pucks": pucks, "limits": limits}
         world = press_world(40, physics=preset, corners=corners, **options)
         cornered(world)
@@ -71,8 +73,17 @@ def test_a_paddle_that_cannot_go_on_stops_and_says_so(backend):
     )
 
 
-@pytest.mark.parametrize(("friction", "tilt"), [(0.0, 0.0), (0.0, 5.5), (0.3, 5.5)])
-@pytest.mark.parametrize("blocks", [0, 6])
+@pytest.mark.parametrize(
+    ("friction", "tilt", "blocks"),
+    [
+        (0.0, 5.5, 0),
+        (0.3, 5.5, 6),
+        pytest.param(0.0, 0.0, 0, marks=pytest.mark.slow),
+        pytest.param(0.3, 5.5, 0, marks=pytest.mark.slow),
+        pytest.param(0.0, 0.0, 6, marks=pytest.mark.slow),
+        pytest.param(0.0, 5.5, 6, marks=pytest.mark.slow),
+    ],
+)
 def test_energy_comes_from_nowhere_and_goes_nowhere(friction, tilt, blocks):
     physics = {
         **{

@@ -5,12 +5,14 @@ import subprocess
 import sys
 
 import pytest
+from command import airhockey
 
 import marl_airhockey as ah
 from marl_airhockey.envs.meanings import term_meanings
 
 
-def airhockey(*words, ok=True, cwd=None):
+def process(*words, ok=True, cwd=None):
+    """Run a command in a process of its own, as a user does."""
     command = [sys.executable, "-m", "marl_airhockey.cli", *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=cwd)
     assert (done.returncode == 0) == ok, done.stderr
@@ -60,7 +62,7 @@ def test_watch_writes_a_film(tmp_path):
 
 
 def test_demo_makes_what_it_says(tmp_path):
-    done = airhockey("demo", "--out", tmp_path, "--steps", 20_000)
+    done = process("demo", "--out", tmp_path, "--steps", 20_000)
     for name in ("learning_curve.png", "juggle.gif", "report.json"):
         assert (tmp_path / name).exists()
         assert name in done.stdout
@@ -114,7 +116,7 @@ def test_bench_measures_and_draws(tmp_path):
 
 
 def test_it_tells_its_version():
-    assert airhockey("--version").stdout.split() == ["marl_airhockey", ah.__version__]
+    assert process("--version").stdout.split() == ["marl_airhockey", ah.__version__]
 
 
 def test_warm_compiles_and_says_so(tmp_path):
@@ -125,15 +127,15 @@ def test_warm_compiles_and_says_so(tmp_path):
 
 def test_a_new_scenario_and_a_new_driver_run(tmp_path):
     for kind, name in (("scenario", "my_bank"), ("driver", "my_push")):
-        done = airhockey("new", kind, name, "--out", tmp_path)
+        done = process("new", kind, name, "--out", tmp_path)
         assert f"{name}.py" in "".join(done.stdout.split())
-        again = airhockey("new", kind, name, "--out", tmp_path, ok=False)
+        again = process("new", kind, name, "--out", tmp_path, ok=False)
         assert "there is such a file" in again.stderr
     words = ("-s", "my_bank.py", "--episodes", 20, "--backend", "numba", "--json")
-    done = airhockey("evaluate", "my_push.py:behind=0.1", *words, cwd=tmp_path)
+    done = process("evaluate", "my_push.py:behind=0.1", *words, cwd=tmp_path)
     data = json.loads(done.stdout)
     assert data["return"] > data["beside"]["still"]["return"]
-    assert "3 once." in airhockey("list", "my_bank.py", cwd=tmp_path).stdout
+    assert "3 once." in process("list", "my_bank.py", cwd=tmp_path).stdout
 
 
 @pytest.mark.parametrize(
@@ -157,8 +159,8 @@ def test_a_pickle_is_refused_unless_it_is_trusted(tmp_path):
     model = PPO("MlpPolicy", ah.make_sb3_vec("reach", 2), n_steps=8, batch_size=16)
     model.save(tmp_path / "model.zip")
     words = ("evaluate", tmp_path / "model.zip", "-s", "reach", "--episodes", 2)
-    assert "--trust" in airhockey(*words, ok=False).stderr
-    assert "success" in airhockey(*words, "--trust", "--no-floors").stdout
+    assert "--trust" in process(*words, ok=False).stderr
+    assert "success" in process(*words, "--trust", "--no-floors").stdout
 
 
 def test_meanings_are_those_of_the_nearest_class():

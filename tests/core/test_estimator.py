@@ -158,7 +158,7 @@ def test_in_the_ideal_profile_it_is_the_truth():
     np.testing.assert_array_equal(estimate, truth)
 
 
-@pytest.mark.compiles_much
+@pytest.mark.usefixtures("uncompiled")
 def test_every_scenario_shows_estimates(scenario):
     world = ah.make_world(scenario, 2, profile="ur5e", observe="estimate")
     world.reset(0)

@@ -50,9 +50,9 @@ def test_an_episode_is_what_a_world_with_its_seed_does(tmp_path, profile):
     world.close()
 
 
-@pytest.mark.compiles_much
+@pytest.mark.usefixtures("uncompiled")
 def test_terms_add_up_to_rewards_and_rewards_to_returns(tmp_path, scenario):
-    keywords = {}
+    keywords = {"max_cycles": 60}
     if len(ah.make_scenario(scenario).scene.seats) > 1:
         seats = range(1, len(ah.make_scenario(scenario).scene.seats))
         keywords["drivers"] = {f"paddle_{i}": "still" for i in seats}

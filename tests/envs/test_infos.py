@@ -132,7 +132,7 @@ def test_an_unknown_keyword_is_an_error_in_the_words_of_python():
         ah.make_vec("juggle", 3).reset(seed=[1, 2])
 
 
-@pytest.mark.compiles_much
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.filterwarnings("ignore")  # of its own
 def test_torchrl_takes_every_scenario_as_it_is(scenario):
     pettingzoo = pytest.importorskip("torchrl.envs.libs.pettingzoo")

@@ -54,8 +54,7 @@ def test_two_processes_on_an_empty_cache_compile_once(tmp_path):
     assert run(LOOP, tmp_path) == ("[1.0, 3.0, 5.0]", "")
 
 
-@pytest.mark.parametrize("damage", [b"", b"not a pickle"])
-@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize(("kind", "damage"), [("nbi", b""), ("nbc", b"not a pickle")])
 def test_a_damaged_file_is_compiled_again_with_one_line(tmp_path, kind, damage):
     run(LOOP, tmp_path)
     (path,) = tmp_path.rglob(f"loop_*.{kind}")

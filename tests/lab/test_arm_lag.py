@@ -57,6 +57,7 @@ def test_gain_and_phase_are_those_of_the_lag():
         assert phase == pytest.approx(wanted, abs=3.0)
 
 
+@pytest.mark.slow
 def test_the_lab_s_arm_is_as_slow_as_its_controller_says(rig):
     known = Rig.load(rig)
     reach = make_seat("robot", TABLES[known.table], 0).reach

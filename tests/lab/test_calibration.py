@@ -37,6 +37,7 @@ def session(lab, tmp_path):
         client.close()
 
 
+@pytest.mark.slow
 def test_a_calibration_from_nothing_finds_what_is_there(lab, session, tmp_path):
     view, corners = lab_view(lab.setup.geometry), np.array(lab.setup.geometry.vertices)
     with pytest.raises(ValueError, match="lens comes first"):
@@ -98,6 +99,7 @@ def test_a_picture_without_a_board_or_tags_has_none():
     assert find_tags(empty) == {}
 
 
+@pytest.mark.slow
 def test_a_hand_is_calibrated_from_nothing(lab, tmp_path):
     true = hand_view()
     with served(lab, announce=False) as port:

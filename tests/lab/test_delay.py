@@ -23,6 +23,7 @@ def test_a_shift_is_found_whatever_the_distance():
         assert find_delay(late, early) == pytest.approx(delay, abs=0.0015)
 
 
+@pytest.mark.slow
 def test_the_lab_s_camera_is_as_late_as_it_was_set_up():
     pytest.importorskip("rtde_control")
     latency = 0.045

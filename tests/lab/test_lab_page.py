@@ -44,6 +44,7 @@ def wait_for(match, phase, seconds=20.0):
     assert match.phase == phase, match.reason
 
 
+@pytest.mark.slow
 def test_an_episode_begins_stops_and_goes_on_by_word(lab, match, fault):
     time.sleep(0.3)
     assert match.phase == "lobby"

@@ -40,6 +40,7 @@ def place_of_arm(lab, place):
     raise AssertionError(f"the arm did not come to {place}, it is at {now}")
 
 
+@pytest.mark.slow
 def test_wherever_the_arm_stands_its_paddle_is_clicked(lab):
     with served(lab, announce=False) as port, closing(LabClient(port)) as client:
         for place in ([-0.69, 0.3], [-0.69, -0.3], [-0.3, 0.2]):
@@ -49,6 +50,7 @@ def test_wherever_the_arm_stands_its_paddle_is_clicked(lab):
             assert abs(rig.paddle.hue - 60) < 10, place
 
 
+@pytest.mark.slow
 def test_the_paddle_is_where_the_arm_is(lab, rig):
     for place in ([-0.5, 0.1], [-0.6, -0.1]):
         place_of_arm(lab, place)
@@ -66,6 +68,7 @@ def test_copies_have_readers_of_their_own(lab, rig):
     play(rig, 1, check)
 
 
+@pytest.mark.slow
 def test_a_silent_arm_is_an_error(lab, rig, fault):
     def check(world):
         fault("silent_robot")

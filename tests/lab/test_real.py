@@ -30,6 +30,7 @@ def test_a_policy_reaches_through_camera_and_robot(rig):
     assert result.interrupted == 0
 
 
+@pytest.mark.slow
 def test_a_puck_is_seen_touched_and_lost_as_it_is(lab, rig):
     world = build_driven_world(
         make_agent("zoo/touch_full_size"), "touch", 1, keywords(rig)
@@ -64,9 +65,9 @@ def test_a_reach_beyond_the_joints_is_refused_before_anything_moves(rig, tmp_pat
     ("name", "words"),
     [
         ("protective_stop", "protective stop"),
-        ("silent_robot", "robot silent"),
         ("frozen_camera", "no frame"),
-        ("lost_puck", "not seen"),
+        pytest.param("silent_robot", "robot silent", marks=pytest.mark.slow),
+        pytest.param("lost_puck", "not seen", marks=pytest.mark.slow),
     ],
 )
 def test_what_fails_ends_the_episode_with_its_reason(lab, rig, fault, name, words):

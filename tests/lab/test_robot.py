@@ -85,6 +85,7 @@ def test_a_command_that_fails_to_come_is_braked(robot):
     assert wait_for(lambda: robot.state is DriverState.RUNNING)
 
 
+@pytest.mark.slow
 def test_a_protective_stop_is_released_by_word_alone(lab, robot, fault):
     drive(robot)
     fault("protective_stop")
@@ -126,6 +127,7 @@ def test_a_silent_robot_is_a_fault_and_gets_a_new_process(lab, robot, fault):
     robot.go_to(lab.setup.home)
 
 
+@pytest.mark.slow
 def test_a_lifted_paddle_is_held_until_somebody_lets_go(lab, robot, fault):
     drive(robot, np.zeros(2), 24)
     fault("puck_under_paddle")

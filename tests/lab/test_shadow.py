@@ -29,6 +29,7 @@ def hand(lab, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_the_hand_is_where_it_is(lab, hand):
     with Hand(HandRig.load(hand)) as seen:
         for order, far, fast in ((STILL, 0.002, 0.05), (ROUND, 0.012, 0.15)):
@@ -79,6 +80,7 @@ def test_a_hand_is_a_paddle_or_leads_one(lab, hand):
     assert np.linalg.norm(far - wanted, axis=1).min() > 0.05, "it leapt to the hand"
 
 
+@pytest.mark.slow
 def test_a_hand_that_leaves_lets_the_paddle_rest(lab, hand):
     lab.ask(ROUND)
     moved = []
@@ -94,6 +96,7 @@ def test_a_hand_that_leaves_lets_the_paddle_rest(lab, hand):
     assert ways[-5:].max() < 1e-6
 
 
+@pytest.mark.slow
 def test_copies_have_cameras_of_their_own(lab, hand):
     lab.ask(STILL)
     driver = ah.make_agent(f"shadow:rig={hand},prescribe=true")

@@ -102,6 +102,7 @@ def led_episode(page, client):
     return rows
 
 
+@pytest.mark.slow
 def test_a_person_leads_the_arm_by_its_video(teleop):
     page, client, folder = teleop
     for _ in range(4):

@@ -7,6 +7,7 @@ import pytest
 from marl_airhockey.lab.lab import Lab
 
 
+@pytest.mark.slow
 def test_labs_that_open_at_once_have_addresses_of_their_own():
     pytest.importorskip("rtde_control")
     labs = []

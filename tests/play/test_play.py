@@ -12,7 +12,7 @@ from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.session import IDLE, Session
 
 
-@pytest.mark.compiles_much
+@pytest.mark.usefixtures("uncompiled")
 def test_every_scenario_is_played_and_drawn(scenario):
     match = LiveMatch(scenario, {}, {}, seed=3)
     assert match.drivers.names == ["person"] * len(match.seats)
@@ -149,6 +149,7 @@ def test_opponents_are_chosen_between_matches_and_ends_change():
         LiveMatch("duel", {"paddle_7": "still"}, {})
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize(
     ("game", "keywords", "fitting"),
     [

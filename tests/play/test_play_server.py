@@ -108,6 +108,7 @@ def test_frames_are_not_held_back_for_acknowledgements():
     assert asyncio.run(option_of_a_connection())
 
 
+@pytest.mark.slow
 def test_bad_clients_do_not_disturb_a_game():
     texts = list(BAD)
 

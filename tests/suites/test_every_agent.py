@@ -129,9 +129,8 @@ def score(first, second, games=60):
 
 
 # Goalkeepers of all strengths keep all shots out while seats see without delay.
-@pytest.mark.parametrize(
-    "script", ["striker", pytest.param("allround", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("script", ["striker", "allround"])
 def test_a_stronger_opponent_plays_better(script):
     names = [f"{script}:strength={level}" for level in ("weak", "fair", "strong")]
     scores = [score(name, "striker") for name in names]

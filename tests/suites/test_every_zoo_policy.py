@@ -13,9 +13,14 @@ from marl_airhockey.registry import ZOO, make_agent, zoo_names
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 
 # The lower levels of a game's ladder differ from its strongest by numbers alone.
-LEVELS = [name for name in zoo_names() if re.search(r"_\d$", name)]
-SLOW = [*LEVELS, "zoo/doubles", "zoo/free_for_all"]
-OTHERS = [name for name in zoo_names() if name not in SLOW]
+# Policies of other profiles and tables are measured in the same way.
+VARIANTS = [name for name in zoo_names() if re.search(r"_(\d|ur5e|full_size)$", name)]
+SLOW = {*VARIANTS, "zoo/doubles", "zoo/free_for_all", "zoo/duel_robot"}
+SLOW -= {"zoo/juggle_ur5e", "zoo/juggle_full_size"}
+NAMES = [
+    pytest.param(name, marks=pytest.mark.slow if name in SLOW else ())
+    for name in zoo_names()
+]
 
 
 @pytest.mark.parametrize("name", zoo_names())
@@ -28,9 +33,7 @@ def test_it_is_small_and_its_card_is_of_today(name):
     assert card["date"] >= "2026-11-21"
 
 
-@pytest.mark.parametrize(
-    "name", [*OTHERS, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)]
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_it_is_as_good_as_its_card(name):
     card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
     grades = card["grades"]

@@ -6,6 +6,8 @@ from situations import idle, place_puck, shoot
 
 import marl_airhockey as ah
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 
 def test_a_goal_in_a_duel_pays_and_is_served_to_who_conceded(backend):
     world = ah.make_world("duel", 4, backend=backend)

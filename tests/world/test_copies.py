@@ -79,6 +79,7 @@ def check_another_process(first, folder):
         np.testing.assert_equal(pickle.load(file), first)
 
 
+@pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("steps", MOMENTS)
 @pytest.mark.parametrize(("game", "keywords"), GAMES)
 def test_copies_of_worlds_go_on_to_the_same_bit(
@@ -90,7 +91,10 @@ def test_copies_of_worlds_go_on_to_the_same_bit(
         check_another_process(first, tmp_path)
 
 
-@pytest.mark.parametrize("steps", MOMENTS)
+@pytest.mark.parametrize(
+    "steps",
+    [MOMENTS[-1], *(pytest.param(s, marks=pytest.mark.slow) for s in MOMENTS[:-1])],
+)
 def test_copies_of_arms_go_on_to_the_same_bit(steps, tmp_path):
     pytest.importorskip("robosuite")
     physics = {"arm_stiffness": (800.0, 1200.0), "arm_payload": 0.1}
