@@ -90,6 +90,32 @@ class Rollout:
     """Step, slot and last observation of episodes that the clock ended"""
 
 
+def generalized_advantage(
+    reward: Tensor,
+    value: Tensor,
+    last_value: Tensor,
+    not_done: Tensor,
+    gamma: float,
+    gae_lambda: float,
+) -> Tensor:
+    """Return generalized advantage estimates (T, n) (Schulman et al., 2016).
+
+    Args:
+        reward: (T, n).
+        value: (T, n) critic's value of the observation before each step.
+        last_value: (n,) critic's value of the observation after the last step.
+        not_done: (T, n) 0 where an episode ended with the step, else 1.
+        gamma: Discount factor.
+        gae_lambda: Factor between one-step errors (0) and whole returns (1).
+    """
+    advantage, running = torch.empty_like(value), torch.zeros_like(last_value)
+    for t in range(len(value) - 1, -1, -1):
+        td_error = reward[t] + gamma * last_value * not_done[t] - value[t]
+        running = td_error + gamma * gae_lambda * not_done[t] * running
+        advantage[t], last_value = running, value[t]
+    return advantage
+
+
 class Trainer:
     """PPO of one run.
 
@@ -179,12 +205,10 @@ class Trainer:
                 steps, slots, seen = zip(*kept.cut, strict=True)
                 beyond = model.critic(model.scaled(torch.from_numpy(np.stack(seen))))
                 reward[list(steps), list(slots)] += config.gamma * beyond[:, 0]
-            advantage, above = torch.empty_like(value), torch.zeros_like(last)
-            for t in range(len(value) - 1, -1, -1):
-                surprise = reward[t] + config.gamma * last * kept.going[t] - value[t]
-                fade = config.gamma * config.gae_lambda
-                above = surprise + fade * kept.going[t] * above
-                advantage[t], last = above, value[t]
+            settings = config.gamma, config.gae_lambda
+            advantage = generalized_advantage(
+                reward, value, last, kept.going, *settings
+            )
             return advantage, advantage + value
 
     def _update(self, kept: Rollout, remaining: float) -> float:

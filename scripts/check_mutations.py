@@ -1,0 +1,251 @@
+"""Apply small faults to a copy of the project and see whether the short tests notice.
+
+    python scripts/check_mutations.py            # all of them, some minutes
+    python scripts/check_mutations.py drag gae   # those
+
+Each fault is one edit of one file. The tests that belong to it are run as `make test`
+runs them, without those that are slow. A fault that no test notices has survived, and
+the exit status is 1.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from marl_airhockey.jit.cache import cache_folder
+
+ROOT = Path(__file__).parents[1]
+
+
+class Fault(NamedTuple):
+    """Small fault, and the tests that must notice it."""
+
+    name: str
+    file: str
+    """Path, in the package unless it begins with ``scenarios``"""
+    old: str
+    """Text that is there once"""
+    new: str
+    tests: str
+    """Paths in ``tests``, separated by spaces"""
+
+
+FAULTS = [
+    Fault(
+        "friction pushes",
+        "core/laws.py",
+        "min(max(-slip / tangential_mass",
+        "min(max(slip / tangential_mass",
+        "core/test_laws.py suites/test_every_backend.py",
+    ),
+    Fault(
+        "restitution subtracted",
+        "core/laws.py",
+        "normal = (1.0 + restitution)",
+        "normal = (1.0 - restitution)",
+        "core/test_laws.py suites/test_every_backend.py",
+    ),
+    Fault(
+        "drag halved",
+        "core/laws.py",
+        "z = drag * time *",
+        "z = 0.5 * drag * time *",
+        "core/test_laws.py",
+    ),
+    Fault(
+        "delay line off by one",
+        "world/delay.py",
+        "np.maximum(last - whole - 1, 0)",
+        "np.maximum(last - whole - 2, 0)",
+        "world/test_sensor.py",
+    ),
+    Fault(
+        "stale sensor frame",
+        "world/sensor.py",
+        'age = values["observation_delay"][rows]\n',
+        'age = values["observation_delay"][rows] + self.control_dt\n',
+        "world/test_sensor.py",
+    ),
+    Fault(
+        "seed without i",
+        "core/rng.py",
+        "return np.uint64(int(given)) + np.arange(worlds, dtype=np.uint64)",
+        "return np.full(worlds, int(given), np.uint64)",
+        "envs/test_bad_input.py",
+    ),
+    Fault(
+        "swapped seat",
+        "world/driven_seat.py",
+        "seats, want = np.array([self.index]), self.driver.observe",
+        "seats, want = np.array([0]), self.driver.observe",
+        "world toolkit/test_players.py",
+    ),
+    Fault(
+        "acceleration not limited",
+        "core/limits.py",
+        "fit = most / max(change, most)",
+        "fit = 1.0",
+        "core/test_limits.py",
+    ),
+    Fault(
+        "reward term dropped",
+        "scenarios/juggle.py",
+        '            "drop": -2.0 * self.terminated(t)[..., None],\n',
+        "",
+        "suites/test_every_scenario.py toolkit cli",
+    ),
+    Fault(
+        "goal for the wrong side",
+        "toolkit/versus.py",
+        "t.after.crossed[..., ::-1].sum(-2)",
+        "t.after.crossed.sum(-2)",
+        "toolkit/test_games_rules.py",
+    ),
+    Fault(
+        "success not latched",
+        "world/referee.py",
+        '"success": episode["success"] | success',
+        '"success": success',
+        "world suites/test_every_goal_scenario.py",
+    ),
+    Fault(
+        "time limit reported as an end",
+        "world/referee.py",
+        '"terminated": terminated,',
+        '"terminated": terminated | over,',
+        "suites/test_every_scenario.py envs",
+    ),
+    Fault(
+        "exporter drops a layer",
+        "learn/layers.py",
+        "_array(x.bias)) for x in linear]",
+        "_array(x.bias)) for x in linear if x is not linear[1]]",
+        "learn/test_runs.py learn/test_offline.py toolkit/test_policies.py",
+    ),
+    Fault(
+        "gae ignores the end",
+        "learn/ppo.py",
+        "td_error = reward[t] + gamma * last_value * not_done[t] - value[t]",
+        "td_error = reward[t] + gamma * last_value - value[t]",
+        "learn/test_ppo.py",
+    ),
+    Fault(
+        "expectile upside down",
+        "learn/offline/iql.py",
+        "advantage > 0, self.config.expectile",
+        "advantage < 0, self.config.expectile",
+        "learn/test_offline.py",
+    ),
+    Fault(
+        "arm beyond its limits",
+        "devices/robot/shaper.py",
+        "        if self._can_brake(wish):\n            return wish\n",
+        "        return wish\n",
+        "devices/test_shaper.py",
+    ),
+    Fault(
+        "camera upside down",
+        "devices/vision/lens.py",
+        "self.centre[:2] + steps[:, None] * ways[:, :2]",
+        "self.centre[:2] - steps[:, None] * ways[:, :2]",
+        "devices/test_vision.py",
+    ),
+    Fault(
+        "recording loses a step",
+        "core/recording.py",
+        "np.stack([row[n] for row in self._rows])",
+        "np.stack([row[n] for row in self._rows[1:]])",
+        "core/test_recording.py",
+    ),
+    Fault(
+        "rating of the loser",
+        "evaluation/league.py",
+        "score[b, a] = played[a, b] - score[a, b]",
+        "score[b, a] = score[a, b]",
+        "evaluation/test_league.py",
+    ),
+    Fault(
+        "own paddle forgotten",
+        "toolkit/observables.py",
+        "out[...] = (ego.puck_now[0] - ego.own[..., None, :]).reshape(out.shape)",
+        "out[...] = ego.puck_now[0].reshape(out.shape)",
+        "world suites/test_every_agent.py",
+    ),
+]
+
+
+def copied(folder: Path) -> None:
+    """Copy what git knows of the project, and new files, into a folder."""
+    listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    done = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True)
+    for name in done.stdout.splitlines():
+        source, target = ROOT / name, folder / name
+        if source.is_file():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(source, target, follow_symlinks=False)
+
+
+def tested(folder: Path, cache: Path, tests: str) -> subprocess.CompletedProcess[str]:
+    """Run some tests of a copy until the first fails."""
+    paths = [f"tests/{path}" for path in tests.split()]
+    command = [sys.executable, "-m", "pytest", "-x", "-m", "not slow", *paths]
+    variables = {"PYTHONPATH": str(folder), "MARL_AIRHOCKEY_CACHE": str(cache)}
+    return subprocess.run(
+        command,
+        cwd=folder,
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+    )
+
+
+def failed_test(output: str) -> str:
+    """Return the first test that failed, or the last line of the output."""
+    lines = output.splitlines()
+    found = [line for line in lines if line.startswith(("FAILED", "ERROR"))]
+    return (found or lines[-1:] or [""])[0].split(" - ")[0]
+
+
+def survives(fault: Fault, folder: Path, cache: Path) -> bool:
+    """Apply a fault, run its tests, print what happened, and take it back."""
+    inside = fault.file if fault.file.startswith("scenarios") else None
+    path = folder / (inside or f"marl_airhockey/{fault.file}")
+    text, began = path.read_text(), time.monotonic()
+    if text.count(fault.old) != 1:
+        raise ValueError(f"{fault.name}: its text is not in {fault.file} once")
+    path.write_text(text.replace(fault.old, fault.new))
+    done = tested(folder, cache, fault.tests)
+    path.write_text(text)
+    if done.returncode not in (0, 1):
+        raise RuntimeError(f"{fault.name}: {done.stdout}{done.stderr}")
+    seconds = time.monotonic() - began
+    if done.returncode:
+        print(f"killed    {fault.name:32} {seconds:4.0f} s  {failed_test(done.stdout)}")
+    else:
+        print(f"SURVIVED  {fault.name:32} {seconds:4.0f} s", flush=True)
+    return not done.returncode
+
+
+def main() -> None:
+    """Apply the faults that the command line names, or all."""
+    words = sys.argv[1:]
+    faults = [f for f in FAULTS if not words or any(word in f.name for word in words)]
+    with tempfile.TemporaryDirectory() as name:
+        folder, cache = Path(name) / "project", Path(name) / "cache"
+        copied(folder)
+        # Faults outside of compiled code find it compiled.
+        shutil.copytree(cache_folder(), cache, symlinks=True)
+        survivors = [fault.name for fault in faults if survives(fault, folder, cache)]
+    print(f"{len(faults) - len(survivors)} of {len(faults)} faults killed")
+    sys.exit(bool(survivors))
+
+
+if __name__ == "__main__":
+    main()
