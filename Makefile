@@ -6,8 +6,10 @@ BIN := .venv/bin
 READY := .venv/.ready
 FAR := .venv-distributed
 JOBS ?= 2
-# All that the workers would compile at the same time is compiled before they start.
-TEST = $(BIN)/airhockey warm --jobs $(JOBS) && $(BIN)/pytest -n $(JOBS)
+# The virtual lab runs in real time: nothing runs beside its tests. What the workers
+# would all compile is compiled before they start.
+REALTIME := tests/lab
+TEST = $(BIN)/airhockey warm --jobs $(JOBS) && $(BIN)/pytest -n $(JOBS) --ignore=$(REALTIME)
 
 help: ## Show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
@@ -33,6 +35,7 @@ demo: setup ## Train a paddle to juggle and show it (a minute)
 
 test: setup lint ## Run linters, types and the tests that are not slow
 	$(TEST) -m 'not slow'
+	$(BIN)/pytest -m 'not slow' $(REALTIME)
 
 check: setup ## Run linters and tests of what has changed since main
 	$(BIN)/python scripts/check_changes.py
@@ -46,6 +49,7 @@ test-one: setup ## Run the tests of one scenario or driver: make test-one NAME=m
 
 test-all: setup lint ## Run every test
 	$(TEST)
+	$(BIN)/pytest $(REALTIME)
 
 # RLlib pins an older gymnasium, so it has an environment of its own.
 $(FAR)/.ready: pyproject.toml constraints.txt

@@ -73,6 +73,7 @@ def test_an_episode_begins_stops_and_goes_on_by_word(lab, match, fault):
     assert match.backend.robot.state.name == "READY"
 
 
+@pytest.mark.slow
 def test_who_is_elsewhere_watches_and_nobody_is_erratic(match):
     switched = []
     session = Session(match)

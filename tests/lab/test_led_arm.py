@@ -58,6 +58,7 @@ def test_the_paddle_is_where_the_arm_is(lab, rig):
         assert np.abs(off).max() < 0.003
 
 
+@pytest.mark.slow
 def test_copies_have_readers_of_their_own(lab, rig):
     def check(world):
         twin = copy.deepcopy(world)

@@ -72,6 +72,7 @@ def test_kill_9_of_its_opener_ends_the_lab():
             opener.wait()
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_no_port_file():
     command = [sys.executable, "-m", "marl_airhockey.cli", "lab"]
     opener = subprocess.Popen(

@@ -115,6 +115,7 @@ def test_an_emergency_stop_is_never_released(lab, robot, fault):
     robot.go_to(lab.setup.home)
 
 
+@pytest.mark.slow
 def test_a_silent_robot_is_a_fault_and_gets_a_new_process(lab, robot, fault):
     drive(robot)
     fault("silent_robot")

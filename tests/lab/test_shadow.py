@@ -65,6 +65,7 @@ def play(agent, steps, check=lambda world, k: None):
         world.close()
 
 
+@pytest.mark.slow
 def test_a_hand_is_a_paddle_or_leads_one(lab, hand):
     lab.ask(STILL)
     time.sleep(0.3)
@@ -114,6 +115,7 @@ def test_copies_have_cameras_of_their_own(lab, hand):
         twin.__exit__(None, None, None)
 
 
+@pytest.mark.slow
 def test_another_rig_and_a_moved_camera_are_named(lab, hand, rig, tmp_path):
     with pytest.raises(ValueError, match="the rig of a table, and that of a hand"):
         ah.make_agent(f"shadow:rig={rig}")

@@ -11,6 +11,7 @@ import urllib.request
 
 import pytest
 import websockets
+from command import airhockey
 from pages import aim, line, served
 
 from marl_airhockey.core.recording import read_recording
@@ -197,8 +198,6 @@ def test_a_taken_port_is_named():
     assert done.returncode == 1
     assert f"--port {port}" in done.stderr
     for bad in (["--port", "99999"], ["--reaction", "900"], ["--opponent", "policy"]):
-        done = subprocess.run(
-            [*command, *bad], capture_output=True, text=True, check=False
-        )
+        done = airhockey("play", "duel", *bad, ok=False)
         assert done.returncode in (1, 2)
         assert "Traceback" not in done.stderr

@@ -74,7 +74,7 @@ def polar(speed, angle):
     return np.stack([speed * np.cos(angle), speed * np.sin(angle)], -1)
 
 
-@pytest.mark.parametrize(("tilt", "damping"), [(0.0, 0.0), (9.0, 0.8)])
+@pytest.mark.parametrize(("tilt", "damping"), [(9.0, 0.8)])
 def test_free_flight_agrees_to_a_millimetre_and_banks_nearly(tilt, damping):
     rng = np.random.default_rng(0)
     worlds = 40

@@ -11,7 +11,9 @@ import pytest
 
 import marl_airhockey as ah
 
-MOMENTS = (0, 1, 60)
+LAST = 60
+MOMENTS = [LAST, *(pytest.param(steps, marks=pytest.mark.slow) for steps in (0, 1))]
+"""Numbers of steps after which copies are made"""
 GAMES = [
     ("juggle", {}),
     ("juggle", {"profile": "ur5e"}),
@@ -87,20 +89,17 @@ def test_copies_of_worlds_go_on_to_the_same_bit(
 ):
     world = ah.make_world(game, 2, backend=backend, **keywords)
     first = check_twins(world, steps, tmp_path)
-    if steps == MOMENTS[-1] and not keywords:
+    if steps == LAST and not keywords:
         check_another_process(first, tmp_path)
 
 
-@pytest.mark.parametrize(
-    "steps",
-    [MOMENTS[-1], *(pytest.param(s, marks=pytest.mark.slow) for s in MOMENTS[:-1])],
-)
+@pytest.mark.parametrize("steps", MOMENTS)
 def test_copies_of_arms_go_on_to_the_same_bit(steps, tmp_path):
     pytest.importorskip("robosuite")
     physics = {"arm_stiffness": (800.0, 1200.0), "arm_payload": 0.1}
     world = ah.make_world("juggle", 2, backend="robosuite", physics=physics)
     first = check_twins(world, steps, tmp_path)
-    if steps == MOMENTS[-1]:
+    if steps == LAST:
         check_another_process(first, tmp_path)
 
 
