@@ -1,5 +1,6 @@
 import importlib.util
 import os
+import random
 import shutil
 from itertools import product
 from typing import ClassVar
@@ -20,10 +21,13 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 def pytest_addoption(parser):
     parser.addoption("--only", help="Run the tests of this scenario or driver alone.")
+    parser.addoption("--shuffle", type=int, help="Run in a random order, by a seed.")
 
 
 def pytest_collection_modifyitems(config, items):
-    """With --only, keep what was made for that name."""
+    """With --shuffle, change the order; with --only, keep the tests of that name."""
+    if (seed := config.getoption("--shuffle")) is not None:
+        random.Random(seed).shuffle(items)
     name = config.getoption("--only")
     if name is None:
         return

@@ -24,8 +24,9 @@ from rollout import rollout
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.scenario import Transition
+from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.state import ARRAYS
+from marl_airhockey.envs.meanings import term_meanings
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import gymnasium_id
 
@@ -155,6 +156,26 @@ def test_observations_lie_in_their_space_and_none_is_constant(
     labels = env.world.observer.layout.labels
     dull = [label for label, s in zip(labels, spread, strict=True) if s == 0]
     assert not dull
+
+
+def test_every_documented_reward_term_is_paid(scenario):
+    game = ah.make_scenario(scenario)
+    documented = term_meanings(type(game)).keys() - term_meanings(Scenario).keys()
+    off = {name for name in documented if getattr(game, f"{name}_weight", 1.0) == 0.0}
+    world = ah.make_world(scenario, 1)
+    world.reset(0)
+    step = world.step(np.zeros((1, len(world.open), 2)))
+    assert documented - off <= step.terms.keys()
+
+
+def test_a_time_limit_truncates_and_does_not_terminate(scenario):
+    world = ah.make_world(scenario, 4, max_cycles=3)
+    world.reset(0)
+    still = np.zeros((4, len(world.open), 2))
+    for ended in (False, False, True):
+        step = world.step(still)
+        assert not step.terminated.any()
+        assert (step.truncated == ended).all()
 
 
 def test_observations_share_no_memory_and_starts_vary(scenario, backend):

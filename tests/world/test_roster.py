@@ -28,6 +28,28 @@ def test_a_roster_plays_as_drivers_inside_do():
     np.testing.assert_allclose(one.state.position, two.state.position, atol=1e-12)
 
 
+class Watching(type(make_agent("random"))):
+    """Driver that keeps the observations it is given."""
+
+    def act(self, view, memory):
+        self.seen.append(view.observation.copy())
+        return super().act(view, memory)
+
+
+def test_a_driver_observes_what_an_agent_at_its_seat_does():
+    open_world = ah.make_world("duel", 3)
+    expected = [open_world.reset(5)]
+    driver = Watching()
+    driver.seen = []
+    world = ah.make_world("duel", 3, drivers={"paddle_1": driver})
+    world.reset(5)
+    for _ in range(20):
+        world.step(np.full((3, 1, 2), 0.4))
+        actions = np.stack([np.full((3, 2), 0.4), world.action[:, 1]], 1)
+        expected.append(open_world.step(actions).observation)
+    np.testing.assert_allclose(driver.seen, np.array(expected)[:-1, :, 1], atol=1e-6)
+
+
 def test_who_sits_where_differs_by_world():
     world = ah.make_world("duel", 4, backend="numba")
     roster = Roster(world)
