@@ -51,6 +51,9 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
         if on:
             arm.stop(Safety.PROTECTIVE_STOP, "asked for")
             controller.dashboard.note_stop()
+        elif arm.safety is Safety.PROTECTIVE_STOP:
+            # Somebody at the pendant has unlocked it.
+            arm.release()
 
     def press_button(on: bool) -> None:
         if on:
