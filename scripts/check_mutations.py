@@ -29,7 +29,7 @@ class Fault(NamedTuple):
 
     name: str
     file: str
-    """Path, in the package unless it begins with ``scenarios``"""
+    """Path in the project"""
     old: str
     """Text that is there once"""
     new: str
@@ -40,56 +40,56 @@ class Fault(NamedTuple):
 FAULTS = [
     Fault(
         "friction pushes",
-        "core/laws.py",
+        "marl_airhockey/core/laws.py",
         "min(max(-slip / tangential_mass",
         "min(max(slip / tangential_mass",
         "core/test_laws.py suites/test_every_backend.py",
     ),
     Fault(
         "restitution subtracted",
-        "core/laws.py",
+        "marl_airhockey/core/laws.py",
         "normal = (1.0 + restitution)",
         "normal = (1.0 - restitution)",
         "core/test_laws.py suites/test_every_backend.py",
     ),
     Fault(
         "drag halved",
-        "core/laws.py",
+        "marl_airhockey/core/laws.py",
         "z = drag * time *",
         "z = 0.5 * drag * time *",
         "core/test_laws.py",
     ),
     Fault(
         "delay line off by one",
-        "world/delay.py",
+        "marl_airhockey/world/delay.py",
         "np.maximum(last - whole - 1, 0)",
         "np.maximum(last - whole - 2, 0)",
         "world/test_delay.py world/test_sensor.py",
     ),
     Fault(
         "stale sensor frame",
-        "world/sensor.py",
+        "marl_airhockey/world/sensor.py",
         'age = values["observation_delay"][rows]\n',
         'age = values["observation_delay"][rows] + self.control_dt\n',
         "world/test_sensor.py",
     ),
     Fault(
         "seed without i",
-        "core/rng.py",
+        "marl_airhockey/core/rng.py",
         "return np.uint64(int(given)) + np.arange(worlds, dtype=np.uint64)",
         "return np.full(worlds, int(given), np.uint64)",
         "envs/test_bad_input.py",
     ),
     Fault(
         "swapped seat",
-        "world/driven_seat.py",
+        "marl_airhockey/world/driven_seat.py",
         "seats, want = np.array([self.index]), self.driver.observe",
         "seats, want = np.array([0]), self.driver.observe",
         "world/test_roster.py",
     ),
     Fault(
         "acceleration not limited",
-        "core/limits.py",
+        "marl_airhockey/core/limits.py",
         "fit = most / max(change, most)",
         "fit = 1.0",
         "core/test_limits.py",
@@ -103,77 +103,77 @@ FAULTS = [
     ),
     Fault(
         "goal for the wrong side",
-        "toolkit/versus.py",
+        "marl_airhockey/toolkit/versus.py",
         "t.after.crossed[..., ::-1].sum(-2)",
         "t.after.crossed.sum(-2)",
         "toolkit/test_games_rules.py",
     ),
     Fault(
         "success not latched",
-        "world/referee.py",
+        "marl_airhockey/world/referee.py",
         '"success": episode["success"] | success',
         '"success": success',
         "world suites/test_every_goal_scenario.py",
     ),
     Fault(
         "time limit reported as an end",
-        "world/referee.py",
+        "marl_airhockey/world/referee.py",
         '"terminated": terminated,',
         '"terminated": terminated | over,',
         "suites/test_every_scenario.py envs",
     ),
     Fault(
         "exporter drops a layer",
-        "learn/layers.py",
+        "marl_airhockey/learn/layers.py",
         "_array(x.bias)) for x in linear]",
         "_array(x.bias)) for x in linear if x is not linear[1]]",
         "learn/test_runs.py learn/test_offline.py toolkit/test_policies.py",
     ),
     Fault(
         "gae ignores the end",
-        "learn/ppo.py",
+        "marl_airhockey/learn/ppo.py",
         "td_error = reward[t] + gamma * last_value * not_done[t] - value[t]",
         "td_error = reward[t] + gamma * last_value - value[t]",
         "learn/test_ppo.py",
     ),
     Fault(
         "expectile upside down",
-        "learn/offline/iql.py",
+        "marl_airhockey/learn/offline/iql.py",
         "advantage > 0, self.config.expectile",
         "advantage < 0, self.config.expectile",
         "learn/test_offline.py",
     ),
     Fault(
         "arm beyond its limits",
-        "devices/robot/shaper.py",
+        "marl_airhockey/devices/robot/shaper.py",
         "        if self._can_brake(wish):\n            return wish\n",
         "        return wish\n",
         "devices/test_shaper.py",
     ),
     Fault(
         "camera upside down",
-        "devices/vision/lens.py",
+        "marl_airhockey/devices/vision/lens.py",
         "self.centre[:2] + steps[:, None] * ways[:, :2]",
         "self.centre[:2] - steps[:, None] * ways[:, :2]",
         "devices/test_vision.py",
     ),
     Fault(
         "recording loses a step",
-        "core/recording.py",
+        "marl_airhockey/core/recording.py",
         "np.stack([row[n] for row in self._rows])",
         "np.stack([row[n] for row in self._rows[1:]])",
         "core/test_recording.py",
     ),
     Fault(
         "rating of the loser",
-        "evaluation/league.py",
+        "marl_airhockey/evaluation/league.py",
         "score[b, a] = played[a, b] - score[a, b]",
         "score[b, a] = score[a, b]",
         "evaluation/test_league.py",
     ),
     Fault(
         "own paddle forgotten",
-        "toolkit/observables.py",
+        "marl_airhockey/toolkit/observables.py",
         "out[...] = (ego.puck_now[0] - ego.own[..., None, :]).reshape(out.shape)",
         "out[...] = ego.puck_now[0].reshape(out.shape)",
         "world suites/test_every_agent.py",
@@ -215,8 +215,7 @@ def failed_test(output: str) -> str:
 
 def survives(fault: Fault, folder: Path, cache: Path) -> bool:
     """Apply a fault, run its tests, print what happened, and take it back."""
-    inside = fault.file if fault.file.startswith("scenarios") else None
-    path = folder / (inside or f"marl_airhockey/{fault.file}")
+    path = folder / fault.file
     text, began = path.read_text(), time.monotonic()
     if text.count(fault.old) != 1:
         raise ValueError(f"{fault.name}: its text is not in {fault.file} once")
