@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.evaluation.as_trained import as_trained, seen_in
 from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult
 from marl_airhockey.evaluation.evaluate import evaluate as evaluate_driver
 from marl_airhockey.evaluation.league import LEAGUE_SEED, play_league
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 def evaluate(
     player: object,
-    scenario: str | Scenario,
+    scenario: str | Scenario | None = None,
     *,
     episodes: int = 200,
     seed: int = TEST_SEED,
@@ -31,9 +32,12 @@ def evaluate(
 ) -> EvaluationResult:
     """Let a player play episodes at ``paddle_0`` and measure it.
 
+    What is not given, a policy's run or file says: scenario, options, profile,
+    observations, control_dt. The result names them.
+
     Args:
         player: of any kind, see `registry.make_agent`.
-        scenario: of any kind, see `registry.find_scenario`.
+        scenario: of any kind, see `registry.find_scenario`; None for that of training.
         episodes: number of episodes, played all at once.
         seed: seed of the first; training never sees those from 2,000,000 on.
         **keywords: of the environment, players of other seats among them.
@@ -43,7 +47,9 @@ def evaluate(
     """
     driver = make_agent(player)
     name = _name(player, driver)
-    return evaluate_driver(driver, name, scenario, episodes, seed, keywords)
+    played, keywords = as_trained({name: driver}, scenario, keywords)
+    driver = seen_in(driver, keywords)
+    return evaluate_driver(driver, name, played, episodes, seed, keywords)
 
 
 def league(
@@ -55,6 +61,8 @@ def league(
     **keywords: Unpack[Keywords],
 ) -> Standings:
     """Let every player play every other and rate them.
+
+    What is not given is as the policies were trained, which must agree.
 
     Args:
         scenario: a game of two sides or more.
@@ -68,6 +76,8 @@ def league(
     """
     named = players if isinstance(players, Mapping) else {n: n for n in players}
     drivers = {name: make_agent(player) for name, player in named.items()}
+    _, keywords = as_trained(drivers, scenario, keywords)
+    drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
     return play_league(scenario, drivers, games, seed, keywords)
 
 

@@ -74,7 +74,12 @@ HEADERS = (
     *("on pymunk", "with the arm", "delayed", "CPU-min", "M steps"),
     *("CPU-s to .5 / .9 / .95", "still", "random", "sticky", "paper's RL"),
 )
-CURVE = ("steps", "cpu_seconds", "success")
+CURVE = {
+    "steps": "steps",
+    "cpu_seconds": "learning_cpu_seconds",
+    "success": "success",
+}
+"""Columns of the committed curves, and of a run's ``evaluations.csv``"""
 Row = dict[str, Any]
 Rows = list[Row]
 
@@ -120,12 +125,16 @@ def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Ro
     key = dict(zip(KEY, values, strict=True))
     row: Row = {**key, "recipe": recipe(config), **measure(config, folder)}
     curve = read(folder / "evaluations.csv")
-    row["cpu_minutes"] = round(float(curve[-1]["cpu_seconds"]) / 60, 2)
+    row["cpu_minutes"] = round(float(curve[-1]["learning_cpu_seconds"]) / 60, 2)
+    row["cpu_minutes_all"] = round(float(curve[-1]["cpu_seconds"]) / 60, 2)
     row["steps"] = int(curve[-1]["steps"])
     for level in THRESHOLDS:
-        times = [float(c["cpu_seconds"]) for c in curve if float(c["success"]) >= level]
+        reached = [c for c in curve if float(c["success"]) >= level]
+        times = [float(c["learning_cpu_seconds"]) for c in reached]
         row[f"cpu_seconds_to_{level}"] = round(times[0], 1) if times else ""
-    points = [{n: round(float(c[n]), 3) for n in CURVE} for c in curve]
+    points = [
+        {n: round(float(c[column]), 3) for n, column in CURVE.items()} for c in curve
+    ]
     return row, [{**key, **point} for point in points]
 
 

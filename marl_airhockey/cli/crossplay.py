@@ -16,6 +16,7 @@ from marl_airhockey.cli.options import (
     Profile,
     Trusting,
     app,
+    as_trained_unless_given,
     console,
     environment,
 )
@@ -29,7 +30,7 @@ def crossplay(
     players: Annotated[list[str], typer.Argument(help="Drivers and policies.")],
     episodes: Annotated[int, typer.Option(help="Of each pair.", min=1)] = 200,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     option: Options = None,
     driver: Drivers = None,
     trust: Trusting = False,
@@ -38,6 +39,7 @@ def crossplay(
     """Let players play with mates that they do not know: the coordination gap."""
     keywords = environment(backend, profile, option, driver)
     mates = {name: make_agent(name) for name in players}
+    _, keywords, mates = as_trained_unless_given(mates, scenario, keywords, as_json)
     found = play_together(scenario, mates, episodes, keywords=keywords)
     if as_json:
         console.print_json(json.dumps(found.to_json()))

@@ -17,9 +17,9 @@ from marl_airhockey.cli.options import (
     Options,
     Profile,
     Trusting,
+    as_trained_unless_given,
     console,
     environment,
-    scenario_for,
 )
 from marl_airhockey.cli.options import Scenario as ScenarioOption
 from marl_airhockey.cli.real_table import (
@@ -52,7 +52,7 @@ def record(
         bool, typer.Option("--film", help="Keep a real table's pictures beside it.")
     ] = False,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     option: Options = None,
     other: Drivers = None,
     lab: LabOption = False,
@@ -64,11 +64,13 @@ def record(
     from marl_airhockey.data.record import record_episodes
 
     keywords = environment(backend, profile, option, other)
+    name = name_on_table(driver, backend)
+    game, keywords, players = as_trained_unless_given(
+        {name: make_agent(name)}, scenario, keywords, as_json
+    )
+    player = players[name]
     if observe is not None:
         keywords["observe"] = observe
-    name = name_on_table(driver, backend)
-    player = make_agent(name)
-    game = scenario_for(player, scenario)
     with real_table(keywords, lab, rig) as table:
         path = record_episodes(player, name, game, episodes, out, seed, table, film)
     _show([path], as_json)

@@ -13,7 +13,9 @@ from rich.table import Table
 from marl_airhockey.cli.options import (
     AsJson,
     Backend,
+    ControlDt,
     Drivers,
+    Observe,
     Options,
     Physics,
     Profile,
@@ -21,10 +23,10 @@ from marl_airhockey.cli.options import (
     Trusting,
     Workers,
     app,
+    as_trained_unless_given,
     bar,
     console,
     environment,
-    scenario_for,
 )
 from marl_airhockey.cli.real_table import (
     REAL,
@@ -46,12 +48,14 @@ def evaluate_driver(
     driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
     scenario: Scenario = None,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     episodes: Annotated[int, typer.Option(help="How many.")] = 200,
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,
     option: Options = None,
     other: Drivers = None,
     physics: Physics = None,
+    observe: Observe = None,
+    control_dt: ControlDt = None,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     num_workers: Workers = None,
     lab: LabOption = False,
@@ -61,15 +65,21 @@ def evaluate_driver(
 ) -> None:
     """Measure a driver over episodes that training never sees.
 
+    A policy plays what it was trained in, unless an option says otherwise.
+
     On a real table, or in the virtual lab, the driver plays alone: no floors, and a
     policy does not sample.
     """
-    keywords = environment(backend, profile, option, other, physics)
+    keywords = environment(
+        backend, profile, option, other, physics, control_dt, observe
+    )
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     driver = name_on_table(driver, backend)
-    seated = make_agent(driver)
-    entries, scenario = [(driver, seated)], scenario_for(seated, scenario)
+    scenario, keywords, players = as_trained_unless_given(
+        {driver: make_agent(driver)}, scenario, keywords, as_json
+    )
+    entries, seated = list(players.items()), players[driver]
     simulated = backend != REAL
     if isinstance(seated, Policy) and simulated:
         sampled = replace(seated, deterministic=False)

@@ -15,12 +15,13 @@ from marl_airhockey.cli.options import (
     Options,
     Profile,
     Trusting,
+    as_trained_unless_given,
     bar,
     console,
     environment,
 )
 from marl_airhockey.core.errors import require
-from marl_airhockey.evaluation.league import find_policies, play_league
+from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, play_league
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
@@ -49,8 +50,9 @@ def league(
         "runs/league"
     ),
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     option: Options = None,
+    seed: Annotated[int, typer.Option(help="Seed of the first game.")] = LEAGUE_SEED,
     exploit: Annotated[
         int | None,
         typer.Option(help="Train a best response to each policy for so many steps."),
@@ -68,7 +70,10 @@ def league(
     names = [str(entry) for entry in entries]
     keywords = environment(backend, profile, option, None)
     entrants = {label(str(entry), names): make_agent(entry) for entry in entries}
-    standings = play_league(scenario, entrants, games, keywords=keywords)
+    _, keywords, entrants = as_trained_unless_given(
+        entrants, scenario, keywords, as_json
+    )
+    standings = play_league(scenario, entrants, games, seed, keywords)
     files = standings.save(out)
     responses: dict[str, list[float]] = {}
     if exploit:

@@ -12,9 +12,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.physics import load_physics
+from marl_airhockey.evaluation.as_trained import (
+    as_trained,
+    describe_environment,
+    seen_in,
+)
 from marl_airhockey.jit.threads import use_threads
-from marl_airhockey.registry import runs_code
-from marl_airhockey.toolkit.policies import Policy
 from marl_airhockey.toolkit.trust import Trust
 from marl_airhockey.world.build import Keywords
 
@@ -28,25 +31,48 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 console = Console()
+errors = Console(stderr=True)
+"""Console of messages that are no results, so that output can be piped"""
 
 Scenario = Annotated[
     str | None,
     typer.Option(
-        "--scenario", "-s", help="What is played; None: the scenario of its training."
+        "--scenario", "-s", help="Scenario; by default that of the policy's training."
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Backend = Annotated[str, typer.Option(help="Physics.")]
 Profile = Annotated[
-    str,
-    typer.Option(help="ideal, a robot's (ur5e, gantry), or a file: airhockey fit."),
+    str | None,
+    typer.Option(
+        help="ideal, ur5e, gantry, or a file of airhockey fit; by default that of the "
+        "policy's training, else ideal."
+    ),
+]
+Observe = Annotated[
+    str | None,
+    typer.Option(
+        help="Form of observations: velocity, estimate or history; by default that of "
+        "the policy's training."
+    ),
+]
+ControlDt = Annotated[
+    float | None,
+    typer.Option(
+        help="Time between two actions, s; by default that of the policy's training, "
+        "else 0.05."
+    ),
 ]
 Options = Annotated[
     list[str] | None,
     typer.Option("--option", help="A field of the scenario, NAME=VALUE; repeatable."),
 ]
 Physics = Annotated[
-    Path | None, typer.Option(help="A preset of physics, TOML; see airhockey fit.")
+    list[str] | None,
+    typer.Option(
+        help="A preset, a TOML file of airhockey fit, NAME=VALUE or NAME=LOW:HIGH; "
+        "repeatable."
+    ),
 ]
 Workers = Annotated[
     int | None,
@@ -94,34 +120,85 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
     return chosen
 
 
-def scenario_for(driver: Driver, given: str | None) -> str:
-    """Return the scenario that a driver plays: as given, or that of its training.
+def physics_of(given: list[str] | None) -> dict[str, Any]:
+    """Return physical parameters by name from the values of ``--physics``.
+
+    Args:
+        given: Names of presets, TOML files, NAME=VALUE and NAME=LOW:HIGH; later ones
+            replace earlier ones.
 
     Raises:
-        ValueError: neither is there; a name of code is not taken from a policy's file.
+        ValueError: None of these.
     """
-    trained = driver.scenario if isinstance(driver, Policy) else ""
-    found = given or ("" if runs_code(trained) else trained)
-    if not found:
-        raise ValueError("--scenario: say what the driver is to play")
+    found: dict[str, Any] = {}
+    for text in given or []:
+        name, equals, value = text.partition("=")
+        if not equals:
+            found |= load_physics(text)
+            continue
+        try:
+            numbers = [float(part) for part in value.split(":")]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in (1, 2):
+            raise ValueError(
+                f"--physics {text}: expected NAME=VALUE or NAME=LOW:HIGH, with numbers"
+            )
+        found[name] = numbers[0] if len(numbers) == 1 else tuple(numbers)
     return found
 
 
 def environment(
     backend: str,
-    profile: str,
+    profile: str | None,
     option: list[str] | None,
     driver: list[str] | None,
-    physics: Path | None = None,
+    physics: list[str] | None = None,
+    control_dt: float | None = None,
+    observe: str | None = None,
 ) -> Keywords:
-    """Return an environment's keywords from the options that commands share."""
-    return {
-        "backend": backend,
-        "profile": profile,
-        "options": settings(option),
-        "drivers": settings(driver),
-        "physics": load_physics(physics) if physics is not None else {},
-    }
+    """Return an environment's keywords from the options that were given."""
+    keywords: Keywords = {"backend": backend}
+    if profile is not None:
+        keywords["profile"] = profile
+    if option:
+        keywords["options"] = settings(option)
+    if driver:
+        keywords["drivers"] = settings(driver)
+    if physics:
+        keywords["physics"] = physics_of(physics)
+    if control_dt is not None:
+        keywords["control_dt"] = control_dt
+    if observe is not None:
+        keywords["observe"] = observe
+    return keywords
+
+
+def as_trained_unless_given(
+    players: dict[str, Driver],
+    scenario: str | None,
+    keywords: Keywords,
+    quiet: bool = False,
+) -> tuple[str, Keywords, dict[str, Driver]]:
+    """Fill in what was not given from what the players were trained in, and print it.
+
+    Args:
+        players: Drivers by name.
+        scenario: Scenario, if it was given.
+        keywords: Keywords that were given.
+        quiet: Whether the line goes to standard error, as the output is JSON.
+
+    Returns:
+        Scenario, keywords, and the players with the observations that were asked for.
+    """
+    found, keywords = as_trained(players, scenario, keywords)
+    assert isinstance(found, str)
+    players = {name: seen_in(player, keywords) for name, player in players.items()}
+    line = describe_environment(found, keywords, players)
+    (errors if quiet else console).print(
+        line, soft_wrap=True, markup=False, highlight=False
+    )
+    return found, keywords, players
 
 
 def measure_of(row: dict[str, float]) -> str:
@@ -137,7 +214,7 @@ def bar() -> Progress:
         TextColumn("{task.percentage:>3.0f} %"),
         TimeRemainingColumn(),
         TextColumn("{task.fields[note]}"),
-        console=Console(stderr=True),
+        console=errors,
     )
 
 

@@ -17,13 +17,15 @@ from marl_airhockey.cli.options import (
     Options,
     Profile,
     Trusting,
+    as_trained_unless_given,
     console,
+    environment,
     settings,
 )
 from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, Handicap
-from marl_airhockey.registry import DEFAULT_BACKEND
+from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
@@ -73,7 +75,7 @@ def play(
         typer.Option(help="Who sits at one seat, AGENT=NAME; person for people."),
     ] = None,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     option: Options = None,
     reaction: Reaction = 1000.0 * Handicap.reaction,
     noise: Noise = Handicap.noise,
@@ -94,19 +96,28 @@ def play(
     from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.real_match import RealMatch
 
-    keywords: Keywords = {
-        "backend": backend,
-        "profile": profile,
-        "options": settings(option),
-    }
+    kind = RealMatch if backend == REAL else LiveMatch
+    keywords = environment(backend, profile, option, None, control_dt=kind.CONTROL_DT)
+    seats = settings(seat)
+    keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
     handicap = Handicap(reaction / 1000.0, noise, pace)
     with real_table(keywords, lab, rig) as table:
-        kind = RealMatch if backend == REAL else LiveMatch
         match = kind(scenario, {}, table, handicap)
-        seat_drivers(match, opponent, settings(seat))
+        seat_drivers(match, opponent, seats)
         with console.status("preparing the table (longer when it is the first time)"):
             match.warm_up()
         host_match(match, record, host, port, browser)
+
+
+def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywords:
+    """Fill in what is not given from what the policies that play were trained in."""
+    from marl_airhockey.play.match_drivers import PERSON
+
+    programs = sorted(str(name) for name in names if name not in (None, PERSON))
+    players = {name: make_agent(name) for name in programs}
+    _, keywords, _ = as_trained_unless_given(players, scenario, given)
+    keywords.pop("drivers", None)  # Every seat of a match gets its driver there.
+    return keywords
 
 
 def host_match(

@@ -15,11 +15,10 @@ from marl_airhockey.cli.options import (
     Options,
     Profile,
     console,
-    settings,
+    environment,
 )
 from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
-from marl_airhockey.world.build import Keywords
 
 
 def teleop(
@@ -42,7 +41,7 @@ def teleop(
         str | None, typer.Option(help="Who sits at all other seats.")
     ] = None,
     backend: Backend = REAL,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     option: Options = None,
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 8480,
@@ -64,11 +63,7 @@ def teleop(
     real = backend == REAL
     if by == "mouse" and hand is not None:
         raise ValueError("--hand: add --by shadow")
-    keywords: Keywords = {
-        "backend": backend,
-        "profile": profile,
-        "options": settings(option),
-    }
+    keywords = environment(backend, profile, option, None)
     # Of a simulated table the lab has the hand alone.
     with (
         real_table(keywords, lab and real, rig) as table,

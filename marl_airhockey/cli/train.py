@@ -21,11 +21,11 @@ from marl_airhockey.cli.options import (
     bar,
     console,
     measure_of,
+    physics_of,
     settings,
     train_with_progress,
 )
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.physics import load_physics
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario
 
 if TYPE_CHECKING:
@@ -77,11 +77,11 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset, or by another --algo; or --resume."""
-    from marl_airhockey.learn.algorithms import PPO, load_any_config, make_config
+    from marl_airhockey.learn.algorithms import PPO, make_config
     from marl_airhockey.learn.config import TrainConfig
 
     given = {
-        "physics": load_physics(physics) if physics is not None else None,
+        "physics": physics_of(physics) or None,
         "total_steps": steps,
         "hidden": [hidden, hidden] if hidden is not None else None,
         "init": str(init) if init is not None else None,
@@ -92,7 +92,7 @@ def train(
     if resume is not None:
         if given or any((scenario, change, option, other, out, data, profile)):
             raise ValueError("--resume goes on as the run was begun: give nothing else")
-        _train(None, resume, load_any_config(resume).scenario, as_json)
+        _train(None, resume, as_json)
         return
     shared = {
         "profile": profile,
@@ -106,12 +106,7 @@ def train(
         _tell_updates(steps, config, changes)
     kind = "" if algo == PPO else f"{algo}-"
     name = find_scenario(config.scenario).name
-    _train(
-        config,
-        out or Path("runs") / f"{name}-{kind}{config.seed}",
-        scenario or config.scenario,
-        as_json,
-    )
+    _train(config, out or Path("runs") / f"{name}-{kind}{config.seed}", as_json)
 
 
 def _tell_updates(steps: int, config: TrainConfig, changes: dict[str, Any]) -> None:
@@ -127,23 +122,24 @@ def _tell_updates(steps: int, config: TrainConfig, changes: dict[str, Any]) -> N
     )
 
 
-def _train(
-    config: AnyConfig | None,
-    folder: Path,
-    scenario: str,
-    as_json: bool,
-) -> None:
+def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
     """Train, or resume a run for None, and print the result."""
     row = train_with_progress(config, folder)
     measure = measure_of(row)
     if as_json:
         console.print_json(json.dumps({"run": str(folder), **row}))
         return
+    minutes = {
+        kind: row.get(f"{kind}_cpu_seconds", 0.0) / 60
+        for kind in ("learning", "evaluation", "setup")
+    }
+    parts = ", ".join(f"{kind} {value:.2f}" for kind, value in minutes.items())
     console.print(
         f"{folder}: {measure} {row[measure]:.3f} after {row['steps']:,.0f} steps "
-        f"and {row['cpu_seconds'] / 60:.1f} CPU-minutes"
+        f"and {row['cpu_seconds'] / 60:.2f} CPU-minutes ({parts})",
+        soft_wrap=True,
     )
-    console.print(f"next: airhockey evaluate {folder} --scenario {scenario}")
+    console.print(f"next: airhockey evaluate {folder}", soft_wrap=True)
 
 
 @app.command()

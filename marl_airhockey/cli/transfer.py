@@ -17,13 +17,13 @@ from marl_airhockey.cli.options import (
     Workers,
     bar,
     console,
+    physics_of,
     settings,
     train_with_progress,
 )
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.physics import load_physics
 from marl_airhockey.core.profiles import PROFILES, find_profile
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend, find_scenario, make_agent
@@ -246,7 +246,7 @@ def fit(
         seen = load_recordings(sorted(recordings.glob(f"*{SUFFIX}")))
     else:
         player = make_agent(driver or f"zoo/{scenario}")
-        there = load_physics(physics) if physics else {}
+        there = physics_of(physics)
         with console.status(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}
             seen = record_play(scenario, player, steps, seed, keywords)

@@ -19,10 +19,10 @@ from marl_airhockey.cli.options import (
     Profile,
     Trusting,
     app,
+    as_trained_unless_given,
     bar,
     console,
     environment,
-    scenario_for,
 )
 from marl_airhockey.cli.options import Scenario as ScenarioOption
 from marl_airhockey.cli.real_table import (
@@ -66,7 +66,7 @@ def trials(
     ] = "",
     seed: Annotated[int, typer.Option(help="Of the order.")] = 0,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     option: Options = None,
     other: Drivers = None,
     physics: Physics = None,
@@ -82,14 +82,19 @@ def trials(
     drivers = {
         name: [make_agent(path) for path in paths] for name, paths in methods.items()
     }
-    game = scenario_for(next(iter(drivers.values()))[0], scenario)
     keywords = environment(backend, profile, option, other, physics)
+    players = {
+        f"{name} {number}": driver
+        for name, some in drivers.items()
+        for number, driver in enumerate(some)
+    }
+    game, keywords, _ = as_trained_unless_given(players, scenario, keywords, as_json)
     where = {
         "backend": backend,
-        "profile": profile,
+        "profile": keywords.get("profile", "ideal"),
         "options": option or [],
         "drivers": other or [],
-        "physics": str(physics or ""),
+        "physics": " ".join(physics or []),
         "table": "lab" if lab else str(rig or ""),
         "operator": operator,
     }

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli.options import Backend, Profile, app, bar
+from marl_airhockey.cli.options import Backend, app, bar
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, scenario_names
 from marl_airhockey.world.build import Keywords, compile_world
 
@@ -21,7 +21,7 @@ def warm(
         list[str] | None, typer.Argument(help="Scenarios; all if none are given.")
     ] = None,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Annotated[str, typer.Option(help="ideal, ur5e, gantry.")] = "ideal",
     jobs: Annotated[
         int, typer.Option(help="Number of processes that compile.", min=1)
     ] = os.cpu_count() or 1,

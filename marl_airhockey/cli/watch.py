@@ -10,15 +10,18 @@ import typer
 from marl_airhockey.cli import play as cli_play
 from marl_airhockey.cli.options import (
     Backend,
+    ControlDt,
     Drivers,
+    Observe,
     Options,
+    Physics,
     Profile,
     Scenario,
     Trusting,
     app,
+    as_trained_unless_given,
     console,
     environment,
-    scenario_for,
 )
 from marl_airhockey.cli.real_table import (
     LabOption,
@@ -37,7 +40,7 @@ def watch(
     ],
     scenario: Scenario = None,
     backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = "ideal",
+    profile: Profile = None,
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
     episodes: Annotated[int, typer.Option(help="How many.")] = 1,
     video: Annotated[
@@ -45,6 +48,9 @@ def watch(
     ] = None,
     option: Options = None,
     other: Drivers = None,
+    physics: Physics = None,
+    observe: Observe = None,
+    control_dt: ControlDt = None,
     camera: Annotated[
         str, typer.Option(help="top, or a camera of the backend: agentview...")
     ] = "top",
@@ -69,11 +75,15 @@ def watch(
         return
     if any(Path(driver).glob(f"*{SUFFIX}")):
         raise ValueError(f"{driver}: holds recordings; name one of its {SUFFIX} files")
-    keywords = environment(backend, profile, option, other)
-    player = make_agent(name_on_table(driver, backend))
-    game = scenario_for(player, scenario)
+    keywords = environment(
+        backend, profile, option, other, physics, control_dt, observe
+    )
+    name = name_on_table(driver, backend)
+    game, keywords, players = as_trained_unless_given(
+        {name: make_agent(name)}, scenario, keywords
+    )
     with real_table(keywords, lab, rig) as table:
-        show_episodes(game, player, table, seed, episodes, video, camera=camera)
+        show_episodes(game, players[name], table, seed, episodes, video, camera=camera)
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 

@@ -7,8 +7,9 @@ controller) and the backend follows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import TracebackType
 from typing import ClassVar, Self
 
@@ -27,8 +28,8 @@ class View:
     """Seats, bodies and goal lines on the table."""
     state: State
     """The sensed state, rotated into the seat's ego frame."""
-    observation: Array | Mapping[str, Array]
-    """(B, D), or the dict of goals="dict", built with the driver's `observe` option."""
+    read: Callable[[], Array | Mapping[str, Array]]
+    """Reader of `observation`, as scripts that never look at it need not pay for it."""
     labels: tuple[str, ...]
     """Name of each element of a flat observation."""
     top_speed: Array
@@ -43,6 +44,11 @@ class View:
     """The scenario's memory, (B, *); goals in the table frame."""
     reaction: float = 0.0
     """Age of all in ``state`` but the own paddle by the rules of the game, s."""
+
+    @cached_property
+    def observation(self) -> Array | Mapping[str, Array]:
+        """(B, D), or the dict of goals="dict", built with the driver's `observe`."""
+        return self.read()
 
 
 PrescribedMotion = Array

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -45,6 +45,9 @@ class AirHockeyVecEnv(VecEnv):
         self._pictures = Pictures(self.world, render_mode)
         self.last_terms: dict[str, float] = {}
         """Mean reward terms of the last step, by name."""
+        self.penalty: Callable[[Array, Array, Array], Array] | None = None
+        """Penalty (slots,) of actions (slots, 2), excess of limits (slots,) and ends of
+        episodes (slots,), which is taken off the rewards; none at first."""
         self._began = time.time()
         self._nothing: dict[str, Any] = {}
         slots = num_worlds * self.seats
@@ -98,6 +101,11 @@ class AirHockeyVecEnv(VecEnv):
         self._lengths += 1
         ended = result.terminated | result.truncated
         success, done = self._pick(result.success), self._done(ended)
+        if self.penalty is not None:
+            excess = self._pick(result.violation)[:, -1]
+            penalty = self.penalty(self._pick(self._actions), excess, done)
+            reward -= penalty.astype(np.float32)
+            self.last_terms["action_penalty"] = -float(penalty.mean())
         infos = [self._nothing] * self.num_envs
         if result.final_observation is not None:
             final = self._slots(result.final_observation)

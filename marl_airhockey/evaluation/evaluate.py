@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,12 @@ class EvaluationResult:
     deployability: Deployability
     interrupted: int = 0
     """Number of episodes that a real table had to end; they are no success"""
+    observe: str = ""
+    """Form of the driver's observations"""
+    control_dt: float = 0.05
+    """Time between two actions, s"""
+    options: dict[str, Any] = field(default_factory=dict)
+    """Options of the scenario that were given or trained with"""
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object, `returns` under the key "return"."""
@@ -142,6 +148,9 @@ def evaluate(
         hits=float(statistics.hits.mean()),
         deployability=deployability,
         interrupted=len(statistics.interruptions),
+        observe=driver.observe or world.observer.observe,
+        control_dt=world.control_dt,
+        options=dict(keywords.get("options", {})),
     )
 
 
@@ -241,7 +250,7 @@ def _act_ms(world: World) -> float:
     single = replace(
         view,
         state=state,
-        observation=one,
+        read=lambda: one,
         top_speed=view.top_speed[:1],
         rng=view.rng.select(np.array([0])),
         scenario_memory={k: v[:1] for k, v in view.scenario_memory.items()},

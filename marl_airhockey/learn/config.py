@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
@@ -15,7 +15,7 @@ from marl_airhockey.core.profiles import SUFFIX, find_profile
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.registry import find_scenario, runs_code
 from marl_airhockey.toolkit.policies import check_run_format
-from marl_airhockey.toolkit.trust import require_trust
+from marl_airhockey.toolkit.trust import is_trusted_code, require_trust
 from marl_airhockey.world.build import Keywords
 
 OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
@@ -37,6 +37,9 @@ class TrainConfig(RunConfig):
         "num_env_runners",
         "ent_coef",
         "log_std_init",
+        "action_rate_weight",
+        "action_jerk_weight",
+        "cost_weight",
         "mirror",
         "script_share",
     )
@@ -66,6 +69,12 @@ class TrainConfig(RunConfig):
     ent_coef: float
     max_grad_norm: float
     log_std_init: float
+    action_rate_weight: float = 0.0
+    """Weight of the squared change of the action, taken off the reward in training"""
+    action_jerk_weight: float = 0.0
+    """Weight of the squared second difference of the action, likewise"""
+    cost_weight: float = 0.0
+    """Weight of ``cost``, the sum of exceeded limits, likewise"""
     mirror: float = 0.5
     """Share of the worlds of a game in which the learner plays all seats"""
     opponents: list[str] = field(default_factory=lambda: list(OPPONENTS))
@@ -193,7 +202,35 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> TrainConf
     form = merged.get("observe", "velocity"), merged.get("options", {})
     if TrainConfig.needs_sb3(*form):
         merged = {"engine": "sb3", **merged}
-    return TrainConfig(**{**merged, "scenario": scenario})
+    config = TrainConfig(**{**merged, "scenario": scenario})
+    number, each = _evaluations(config, changes or {})
+    return replace(config, evaluations=number, eval_episodes=each)
+
+
+EVALUATION_SHARE = 0.2
+"""Most CPU time of a game's evaluations, as a share of that of learning"""
+EVALUATION_COST = 1.5
+"""CPU time of a control step of an evaluation's game, in steps of learning"""
+FEWEST_GAMES = 20
+"""Games against each rival below which there are fewer evaluations instead"""
+
+
+def _evaluations(config: TrainConfig, changes: Mapping[str, Any]) -> tuple[int, int]:
+    """Return number and games of the evaluations that a game's training can afford.
+
+    What is set stays as it is. A task's episodes are short and need no bound.
+    """
+    number, each = config.evaluations, config.eval_episodes
+    if not config.self_play:
+        return number, each
+    game = find_scenario(config.scenario, **config.options)
+    steps = game.seconds / config.control_dt * len(config.rivals)
+    games = EVALUATION_SHARE * config.total_steps / (EVALUATION_COST * steps)
+    if "evaluations" not in changes:
+        number = min(number, max(int(games / FEWEST_GAMES), 1))
+    if "eval_episodes" not in changes:
+        each = min(each, max(int(games / number), 1))
+    return number, each
 
 
 def _lags(profile: str) -> dict[str, Any]:
@@ -208,7 +245,7 @@ def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
     """Ask before a configuration, maybe somebody else's, runs code that it names."""
     named = [data.get("scenario", ""), *dict(data.get("drivers", {})).values()]
     named += [*data.get("opponents", []), *data.get("rivals", [])]
-    found = [text for text in named if runs_code(str(text))]
+    found = [t for t in map(str, named) if runs_code(t) and not is_trusted_code(t)]
     if found:
         require_trust(path, code=f"the name of Python code, {found[0]}")
 

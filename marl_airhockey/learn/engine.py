@@ -67,14 +67,14 @@ def training_threads(count: int) -> Iterator[None]:
         torch.set_flush_denormal(False)
 
 
-def start_clock(run: TrainingRun[TrainConfig]) -> None:
-    """Count the time of training from now on, after what is compiled once.
+def end_setup(run: TrainingRun[TrainConfig]) -> None:
+    """Compile what restarts of worlds need, and count the time until now as setup.
 
     Arms are slow to build and compile next to nothing, so they are left alone.
     """
     if find_backend(run.config.backend).ideal:
         compile_world(run.config.scenario, run.config.training_keywords)
-    run.start_clock()
+    run.end_setup()
 
 
 def make_logger(folder: Path, steps: int) -> Logger:

@@ -16,7 +16,7 @@ from marl_airhockey.learn.config import TrainConfig, load_config, preset
 from marl_airhockey.learn.run import Progress
 from marl_airhockey.registry import find_scenario, make_agent
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import Policy, policy_driver
+from marl_airhockey.toolkit.policies import Policy, policy_driver, trained_in
 
 EPISODES = 1000
 """Episodes by which a task's policy is measured"""
@@ -47,8 +47,7 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
     card = {
         **last.card,
         "version": find_scenario(config.scenario).version,
-        "options": config.options,
-        "profile": config.profile,
+        **trained_in(vars(config)),
         "command": training_command(config),
         "seed": config.seed,
         "steps": steps,

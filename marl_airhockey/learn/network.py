@@ -13,7 +13,12 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import RUN_FORMAT, numpy_actor, scaled_policy
+from marl_airhockey.toolkit.policies import (
+    RUN_FORMAT,
+    numpy_actor,
+    scaled_policy,
+    trained_in,
+)
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -58,7 +63,7 @@ def policy_card(config: RunConfig, labels: Sequence[str]) -> dict[str, Any]:
     """
     return {
         "run_format": RUN_FORMAT,
-        "scenario": config.scenario,
+        **trained_in(vars(config)),
         "observe": config.observe,
         "labels": list(labels),
     }

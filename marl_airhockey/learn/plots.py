@@ -26,7 +26,7 @@ def plot_learning_curve(
         path: PNG to write.
     """
     figure, axes = plt.subplots(figsize=(7.2, 4.2), dpi=DPI, layout="constrained")
-    cpu = [0.0, *(float(row["cpu_seconds"]) for row in rows)]
+    cpu = [0.0, *(float(row["learning_cpu_seconds"]) for row in rows)]
     for name, label, ink in (
         ("success", "learned, mean action", INK),
         ("success_sampled", "learned, sampled", PALE),
@@ -36,7 +36,7 @@ def plot_learning_curve(
     for (name, level), ink in zip(floors.items(), INKS, strict=False):
         axes.axhline(level, color=ink, linestyle="--", linewidth=1.2, label=name)
     axes.set(
-        xlabel="CPU-seconds of training",
+        xlabel="CPU-seconds of learning, without evaluations",
         ylabel="success",
         ylim=(-0.03, 1.03),
         xlim=(0, None),
@@ -52,7 +52,7 @@ def plot_seed_curves(
     """Draw success against CPU-seconds, a panel for each task, by `charts.plot_iqm`.
 
     Args:
-        runs: rows of ``evaluations.csv`` of each seed, by task.
+        runs: rows of each seed, by task: ``cpu_seconds`` of learning and ``success``.
         path: PNG to write.
     """
     across = min(5, len(runs))
@@ -80,6 +80,6 @@ def plot_seed_curves(
         axes.axhline(0.95, color=INKS[0], linestyle=":", linewidth=1)
         axes.set(title=name.replace("_", " "), ylim=(-0.03, 1.03), xlim=(0, None))
         tidy(axes, legend=None)
-    figure.supxlabel("CPU-seconds of training")
+    figure.supxlabel("CPU-seconds of learning, without evaluations")
     figure.supylabel("success")
     save(figure, path)

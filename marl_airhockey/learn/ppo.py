@@ -19,11 +19,11 @@ from torch import Tensor, nn
 from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
+    end_setup,
     evaluate_policy,
     make_logger,
     note_step,
     save_weights,
-    start_clock,
     training_threads,
 )
 from marl_airhockey.learn.grade import Metrics
@@ -143,7 +143,7 @@ class Trainer:
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
         self._logger = make_logger(run.folder, run.progress.steps)
         self._seen = self._env.reset()
-        start_clock(run)
+        end_setup(run)
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""

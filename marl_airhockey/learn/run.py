@@ -25,22 +25,40 @@ class Progress:
     """Progress of a run, the content of ``state.json``."""
 
     steps: int = 0
-    cpu_seconds: float = 0.0
+    learning_cpu_seconds: float = 0.0
+    """CPU time of rollouts and updates, those of other processes included"""
+    evaluation_cpu_seconds: float = 0.0
+    """CPU time of evaluations and of writing policies"""
+    setup_cpu_seconds: float = 0.0
+    """CPU time before the first step: compiling, building worlds and networks"""
     wall_seconds: float = 0.0
     rate: float = 0.0
     best: tuple[float, float] = (-1.0, float("-inf"))
     """First metric and return of the best evaluation"""
 
+    @property
+    def cpu_seconds(self) -> float:
+        """All CPU time, s."""
+        return sum(self.cpu_times.values())
+
+    @property
+    def cpu_times(self) -> dict[str, float]:
+        """CPU time of each kind, s, by the names of the fields."""
+        fields = vars(self)
+        return {name: fields[name] for name in fields if name.endswith("_cpu_seconds")}
+
     def save(self, path: Path) -> None:
         """Write the file such that a killed process leaves the old or the new one."""
         draft = path.with_suffix(".part")
-        draft.write_text(json.dumps(self.__dict__))
+        draft.write_text(json.dumps({"cpu_seconds": self.cpu_seconds, **vars(self)}))
         draft.replace(path)
 
     @staticmethod
     def load(path: Path) -> Progress:
         """Read what `save` wrote."""
         data = json.loads(path.read_text())
+        learning = data.pop("cpu_seconds")  # Older runs have counted nothing else.
+        data = {"learning_cpu_seconds": learning, **data}
         return Progress(**{**data, "best": tuple(data["best"])})
 
 
@@ -68,7 +86,7 @@ class TrainingRun(Generic[Config]):
             with self._table.open() as file:
                 *_, last = csv.DictReader(file)
             self.latest = {name: float(value) for name, value in last.items()}
-        self.start_clock()
+        self._clock = (time.process_time(), time.perf_counter())
 
     @property
     def steps_left(self) -> int:
@@ -80,22 +98,27 @@ class TrainingRun(Generic[Config]):
         """True if it is time for an evaluation."""
         return self.progress.steps >= self._next
 
-    def start_clock(self) -> None:
-        """Count the time of training from now on."""
+    def end_setup(self) -> None:
+        """Count the time until now as setup, what follows as learning."""
+        self.progress.setup_cpu_seconds += self._cpu_seconds()
+
+    def _cpu_seconds(self) -> float:
+        """Return the CPU time since the last call; add the time to that of the run."""
+        began = self._clock
         self._clock = (time.process_time(), time.perf_counter())
+        self.progress.wall_seconds += self._clock[1] - began[1]
+        return self._clock[0] - began[0]
 
     def update_progress(self, steps: int, rate: float, elsewhere: float = 0.0) -> None:
-        """Set the steps done, add the time since the last call, and report both.
+        """Set the steps done, count the time since the last call as learning.
 
         Args:
             steps: steps since the beginning of the run.
             rate: learning rate now, with which a resumed run continues.
             elsewhere: CPU time of other processes since the last call, s.
         """
-        progress, began = self.progress, self._clock
-        self.start_clock()
-        progress.cpu_seconds += self._clock[0] - began[0] + elsewhere
-        progress.wall_seconds += self._clock[1] - began[1]
+        progress = self.progress
+        progress.learning_cpu_seconds += self._cpu_seconds() + elsewhere
         progress.steps, progress.rate = steps, rate
         if self._report is not None:
             self._report(steps, self.config.total_steps, self.latest)
@@ -105,34 +128,44 @@ class TrainingRun(Generic[Config]):
     ) -> Metrics:
         """Add a row to ``evaluations.csv``, save policy and progress; return the row.
 
-        The time since the last `update_progress` does not count as training.
+        The time since the last `update_progress` counts as evaluation.
 
         Args:
             metrics: evaluation of the policy as it is.
             save: function that writes the policy under a name, "best" or "last".
         """
         progress = self.progress
+        progress.evaluation_cpu_seconds += self._cpu_seconds()
         clock = {
             "steps": progress.steps,
             "cpu_seconds": progress.cpu_seconds,
+            **progress.cpu_times,
             "wall_seconds": progress.wall_seconds,
         }
         self.latest = {**clock, **metrics}
-        fresh = not self._table.exists()
-        with self._table.open("a", newline="") as file:
-            writer = csv.DictWriter(file, list(self.latest))
-            if fresh:
-                writer.writeheader()
-            writer.writerow(self.latest)
+        self._write(self.latest)
         score = (next(iter(metrics.values())), metrics["return"])
         if score > tuple(progress.best):
             progress.best = score
             save("best")
         save("last")
+        progress.evaluation_cpu_seconds += self._cpu_seconds()
         progress.save(self.folder / "state.json")
         self._next = (progress.steps // self._every + 1) * self._every
-        self.start_clock()
         return self.latest
+
+    def _write(self, row: Metrics) -> None:
+        """Add a row to the table, with the columns that it has."""
+        columns = list(row)
+        if self._table.exists():
+            with self._table.open() as file:
+                columns = next(csv.reader(file))
+        fresh = not self._table.exists()
+        with self._table.open("a", newline="") as file:
+            writer = csv.DictWriter(file, columns, extrasaction="ignore")
+            if fresh:
+                writer.writeheader()
+            writer.writerow(row)
 
     @property
     def checkpoint_path(self) -> Path:

@@ -11,8 +11,8 @@ from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
+    end_setup,
     make_logger,
-    start_clock,
     training_threads,
 )
 from marl_airhockey.learn.grade import Metrics
@@ -44,7 +44,7 @@ def _train(run: TrainingRun[TrainConfig]) -> Metrics:
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(make_logger(folder, progress.steps))
     callback = TrainingCallback(run, rate)
-    start_clock(run)
+    end_setup(run)
     fresh = progress.steps == 0
     model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
     row = callback.evaluate()

@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.evaluation.games import teams_of
+from marl_airhockey.learn.action_penalty import ActionPenalty
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.make import make_sb3_vec
 from marl_airhockey.registry import make_agent
@@ -202,6 +203,14 @@ def make_training_env(
         num_worlds: number of worlds.
         pool: folder of the snapshots of self-play.
     """
+    env = _worlds(config, num_worlds, pool)
+    weights = config.action_rate_weight, config.action_jerk_weight, config.cost_weight
+    if any(weights):
+        env.penalty = ActionPenalty(*weights)
+    return env
+
+
+def _worlds(config: TrainConfig, num_worlds: int, pool: Path) -> AirHockeyVecEnv:
     if not config.self_play:
         return make_sb3_vec(config.scenario, num_worlds, **config.training_keywords)
     return SelfPlayVecEnv(

@@ -22,6 +22,7 @@ from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
 from marl_airhockey.registry import make_agent
+from marl_airhockey.toolkit.trust import trust_code
 
 
 def train(
@@ -56,6 +57,8 @@ def train(
     before = set(folder.rglob("*"))
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.toml").write_text(config.to_toml())
+    for named in (config.scenario, *config.drivers.values()):
+        trust_code(named)
     (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
     try:
         return go_on()

@@ -67,8 +67,8 @@ PRESETS = {
 class HandicappedDriver(Driver):
     """Driver that passes on another one's actions within a handicap.
 
-    It decides as often as the other one; every 0.05 s if that one has no control_dt of
-    its own, as policies were trained to.
+    It decides as often as the other one; without a control_dt of its own as often as in
+    its training, every 0.05 s if nothing says.
     """
 
     inner: Driver
@@ -76,7 +76,8 @@ class HandicappedDriver(Driver):
 
     def __post_init__(self) -> None:
         self.observe = self.inner.observe
-        self.control_dt = self.inner.control_dt or 0.05
+        trained = getattr(self.inner, "trained_in", {}).get("control_dt")
+        self.control_dt = self.inner.control_dt or trained or 0.05
         self._delay = round(self.handicap.reaction / self.control_dt)
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:

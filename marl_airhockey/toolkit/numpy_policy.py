@@ -8,17 +8,31 @@ import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from marl_airhockey.types import Array
 
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
 LARGEST = 64_000_000
 """Largest number of bytes that the arrays of a file may take."""
 MOST = 100
 """Largest number of arrays in a file."""
+FEW_ROWS = 8
+"""Number of observations for which BLAS takes one thread anyway"""
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Return the controller of the threads of BLAS."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 @dataclass(frozen=True)
@@ -50,6 +64,14 @@ class NumpyPolicy:
         if isinstance(observation, Mapping):
             parts = ("observation", "achieved_goal", "desired_goal")
             observation = np.concatenate([observation[part] for part in parts], -1)
+        if len(observation) <= FEW_ROWS:
+            return self._forward(observation)
+        # Threads of BLAS wait busily for each other: for layers as small as these they
+        # cost twice the CPU time on two cores, and more on more.
+        with _blas().limit(limits=1, user_api="blas"):
+            return self._forward(observation)
+
+    def _forward(self, observation: Array) -> Array:
         x = (observation - self.centre) / self.unit
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)

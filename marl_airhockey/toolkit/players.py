@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.toolkit.policies import Policy
+from marl_airhockey.toolkit.policies import Policy, model_environment
 from marl_airhockey.types import Array
 
 
@@ -74,7 +74,8 @@ def driver_of(player: object) -> Driver:
             f"{source}: a class that is no Driver; give an object of it instead"
         )
     if callable(getattr(player, "predict", None)):
-        return OwnPolicy(_Model(player), source=source)
+        known = model_environment(player)
+        return OwnPolicy(_Model(player), source=source, trained_in=known)
     if callable(player):
         return OwnPolicy(_Function(player), source=source)
     raise ValueError(

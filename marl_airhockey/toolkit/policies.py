@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import tomllib
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -49,8 +50,8 @@ class Policy(Driver):
     deterministic: bool = True
     noise: Array | None = None
     """Standard deviation of sampled actions (2,), if `predict` returns only means"""
-    scenario: str = ""
-    """Scenario that it was trained in, if it is known"""
+    trained_in: Mapping[str, Any] = field(default_factory=dict)
+    """Environment of its training, as far as it is known, see `trained_in`"""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -74,6 +75,32 @@ class Policy(Driver):
 
     def _actions(self, observation: Any) -> Array:
         return np.asarray(self.predict(observation, self.deterministic), np.float64)
+
+
+TRAINED_IN: dict[str, type | tuple[type, ...]] = {
+    "scenario": str,
+    "profile": str,
+    "options": dict,
+    "physics": dict,
+    "drivers": dict,
+    "control_dt": (int, float),
+    "goals": str,
+}
+"""What describes the environment of a training, and its types"""
+
+
+def trained_in(card: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a policy's card or a run's settings say of its environment.
+
+    Returns:
+        The scenario's name, and keywords of environments; without what is not there or
+        is of another type, as files come from anywhere.
+    """
+    return {
+        name: card[name]
+        for name, kind in TRAINED_IN.items()
+        if isinstance(card.get(name), kind)
+    }
 
 
 def load_policy(
@@ -102,15 +129,27 @@ def load_policy(
     if not path.exists():
         raise ValueError(f"{path}: there is no such policy file")
     if path.suffix == ".npz":
-        return policy_driver(NumpyPolicy.load(path), str(path), deterministic)
-    if path.suffix == ".onnx":
-        return _load_onnx(path, deterministic)
-    if path.suffix == ".zip":
-        return _load_sb3(path, deterministic, trust)
-    raise ValueError(
-        f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file or an "
-        ".npz"
-    )
+        policy = policy_driver(NumpyPolicy.load(path), str(path), deterministic)
+    elif path.suffix == ".onnx":
+        policy = _load_onnx(path, deterministic)
+    elif path.suffix == ".zip":
+        policy = _load_sb3(path, deterministic, trust)
+    else:
+        raise ValueError(
+            f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file "
+            "or an .npz"
+        )
+    # Cards of older runs say less than the settings beside them.
+    policy.trained_in = {**_run_settings(path.parent), **policy.trained_in}
+    return policy
+
+
+def _run_settings(folder: Path) -> dict[str, Any]:
+    """Return what the settings in a run's folder say of its environment, if any."""
+    try:
+        return trained_in(tomllib.loads((folder / "config.toml").read_text()))
+    except (OSError, ValueError):
+        return {}
 
 
 def policies_of(run: Path) -> list[Path]:
@@ -143,7 +182,7 @@ def policy_driver(
         source,
         deterministic,
         np.exp(policy.log_std),
-        policy.card.get("scenario", ""),
+        trained_in(policy.card),
     )
 
 
@@ -251,7 +290,23 @@ def _load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
         card.get("observe"),
         str(path),
         deterministic,
+        trained_in=model_environment(model),
     )
+
+
+def model_environment(model: Any) -> dict[str, Any]:
+    """Return what a model says of the environment of its training, see `trained_in`.
+
+    Args:
+        model: of stable-baselines3, or anything else with a ``card`` or an
+            ``observation_space``.
+    """
+    card = getattr(model, "card", None)
+    known = trained_in(card if isinstance(card, Mapping) else {})
+    spaces = getattr(getattr(model, "observation_space", None), "spaces", None)
+    if isinstance(spaces, Mapping) and "desired_goal" in spaces:
+        return {**known, "goals": "dict"}
+    return known
 
 
 def _predict_sb3(policy: Any, observation: Any, deterministic: bool) -> Array:

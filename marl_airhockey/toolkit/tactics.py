@@ -6,6 +6,7 @@ All arrays are in the ego frame of a seat, over W worlds.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
-from marl_airhockey.core.reckoning import Walls, reckon
+from marl_airhockey.core.reckoning import Walls, reckon_rows
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
@@ -76,6 +77,7 @@ class Field:
     """Walls, as it counts on them."""
 
     @staticmethod
+    @lru_cache(maxsize=64)
     def of(scene: Scene, seat: int) -> Field:
         """Return the field of a seat."""
         table, me = scene.table, scene.seats[seat]
@@ -109,12 +111,12 @@ def nearest_puck(view: View, field: Field, lag: float) -> tuple[Array, Array]:
     """Reckon place and velocity (W, 2) of the puck that is, or will be, nearest.
 
     Pucks are brought forward over the reaction of the game, less ``lag``, see
-    `reckoning.reckon`; a longer lag takes them straight back.
+    `reckoning.reckon_rows`; a longer lag takes them straight back.
     """
     place, motion = view.state.puck, view.state.puck_velocity
     ahead = view.reaction - lag
     if ahead > 0.0:
-        place, motion = reckon(place, motion, ahead, field.walls)
+        place, motion = reckon_rows(place, motion, ahead, field.walls)
     else:
         place = place + ahead * motion
     which = (place[..., 0] + 0.4 * motion[..., 0]).argmin(-1)

@@ -1,14 +1,22 @@
-"""Trust: files that hold pickled Python are opened after a yes alone.
+"""Trust: code that comes from a file runs after a yes alone.
 
 Whoever unpickles a file runs what its author wrote into it. The zips of
-stable-baselines3 are such files; .npz and .onnx files hold numbers.
+stable-baselines3 are such files; .npz and .onnx files hold numbers. The settings of a
+run may name Python files, which run without a question if the user has trained with
+exactly this code on this machine before.
 """
 
 from __future__ import annotations
 
+import hashlib
 import sys
 from pathlib import Path
 from typing import ClassVar
+
+from marl_airhockey.jit.cache import cache_folder
+
+TRUSTED_CODE = "trusted-code.txt"
+"""File in the cache folder with the SHA-256 of each Python file trained with."""
 
 
 class Trust:
@@ -52,3 +60,27 @@ def require_trust(
             f"{path}: it holds {code}, which loading would run; say --trust, or from "
             "Python load_policy(path, trust=True), if you trust where it comes from"
         )
+
+
+def trust_code(text: str) -> None:
+    """Remember the Python file that a text names as trusted, with what is in it now.
+
+    Args:
+        text: ``FILE.py`` or ``FILE.py:NAME``; anything else is left alone.
+    """
+    digest = _digest(text)
+    if digest and not is_trusted_code(text):
+        with (cache_folder() / TRUSTED_CODE).open("a") as file:
+            file.write(f"{digest}\n")
+
+
+def is_trusted_code(text: str) -> bool:
+    """Return True if a text names a Python file that `trust_code` knows, unchanged."""
+    digest, known = _digest(text), cache_folder() / TRUSTED_CODE
+    return bool(digest) and known.exists() and digest in known.read_text().split()
+
+
+def _digest(text: str) -> str:
+    """Return the SHA-256 of the Python file that a text names; "" for none."""
+    path = Path(text.partition(".py")[0] + ".py")
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

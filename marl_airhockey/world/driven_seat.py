@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.delay import ALL, Rows
-from marl_airhockey.world.observer import Observer
+from marl_airhockey.world.observer import Observation, Observer
 
 
 class DrivenSeat:
@@ -109,8 +110,14 @@ class DrivenSeat:
         worlds: Rows = ALL,
     ) -> View:
         """Return the view of the driver in some worlds; arrays are of all of them."""
-        seats, want = np.array([self.index]), self.driver.observe
-        shown = self._observer.read(sensed, memory, seats, want, worlds)
+
+        def read() -> Observation:
+            seats, want = np.array([self.index]), self.driver.observe
+            shown = self._observer.read(sensed, memory, seats, want, worlds)
+            if isinstance(shown, Mapping):
+                return {name: array[:, 0] for name, array in shown.items()}
+            return np.asarray(shown)[:, 0]
+
         state, known = self._observer.seen(sensed, memory)
         if worlds is not ALL:
             state = state.map(lambda x: x[worlds])
@@ -126,11 +133,7 @@ class DrivenSeat:
         return View(
             scene=self._observer.scenario.scene,
             state=replace(state, position=position, velocity=velocity),
-            observation=(
-                {k: v[:, 0] for k, v in shown.items()}
-                if isinstance(shown, dict)
-                else np.asarray(shown)[:, 0]
-            ),
+            read=read,
             labels=self._layout.labels,
             top_speed=physics["paddle_speed"][worlds],
             reach=np.asarray(self._seat.reach),

@@ -136,7 +136,9 @@ class Observer:
         if self._perception is not None:
             # The own paddle, and what it was asked for, are known at once.
             sensor["history"] = self._perception.seen("sensor")["history"]
-            sensor["place"], sensor["motion"] = sensed.paddle, sensed.paddle_velocity
+            # Contiguous, as compiled loops take them.
+            own = sensed.paddle, sensed.paddle_velocity
+            sensor["place"], sensor["motion"] = map(np.ascontiguousarray, own)
         return vars(state), known, sensor
 
     def read(

@@ -51,15 +51,10 @@ class Roster:
 
     def ask(self, actions: Array) -> None:
         """Fill in (B, seats, 2) what players ask for; other seats are left alone."""
-        world = self.world
+        world, episode = self.world, self.world.episode
+        now = world.sensed, world.memory, episode.physics, episode.cycles
         for player, seat, rows in self._sitting(np.arange(world.num_worlds)):
-            actions[rows, seat] = self._seats[player][seat].act(
-                world.sensed,
-                world.memory,
-                world.episode.physics,
-                world.episode.cycles,
-                rows,
-            )
+            actions[rows, seat] = self._seats[player][seat].act(*now, rows)
 
     def _sitting(self, worlds: Array) -> list[tuple[int, int, Array]]:
         """Player, seat and the worlds, among some, where the one sits at the other."""

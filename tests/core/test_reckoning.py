@@ -5,8 +5,9 @@ import pytest
 from situations import idle
 
 import marl_airhockey as ah
-from marl_airhockey.core.reckoning import Walls, reckon
+from marl_airhockey.core.reckoning import Walls, reckon, reckon_rows
 from marl_airhockey.core.table import Table
+from marl_airhockey.registry import make_scenario
 
 BOX = Table.rectangle(2.0, 1.0)
 
@@ -89,3 +90,17 @@ def test_seats_with_a_reaction_see_pucks_as_they_were_and_would_be_now():
     gap = [labels.index(f"own_to_puck_0.d{axis}") for axis in "xy"]
     own = world.state.paddle[:, 0]
     np.testing.assert_allclose(seen[:, 0, gap], seen[:, 0, now] - own, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["duel", "free_for_all"])
+def test_compiled_rows_equal_numpy(name):
+    scene = make_scenario(name).scene
+    rng, sides = np.random.default_rng(2), Walls.of(scene)
+    place = rng.uniform(-0.25, 0.25, (50, 2, 2))
+    motion = rng.normal(0.0, 6.0, (50, 2, 2))
+    for got, expected in zip(
+        reckon_rows(place, motion, 0.3, sides),
+        reckon(place, motion, 0.3, sides),
+        strict=True,
+    ):
+        np.testing.assert_allclose(got, expected, atol=1e-12)

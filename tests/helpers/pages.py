@@ -27,7 +27,8 @@ def running(*words):
         env={**os.environ, "BROWSER": "true"},
     )
     try:
-        yield re.search(r"http://\S+", process.stdout.readline())[0], process
+        addresses = (re.search(r"http://\S+", text) for text in process.stdout)
+        yield next(filter(None, addresses))[0], process
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(10)

@@ -155,3 +155,47 @@ def test_pixels_and_goals_are_learned_by_sb3(changes):
     assert preset("reach").engine == "torch"
     with pytest.raises(ValueError, match="torch learns from flat observations"):
         preset("reach", {**given, "options": options, "engine": "torch"})
+
+
+def test_all_cpu_time_is_counted_by_kind(tmp_path):
+    began = time.process_time()
+    train(preset("touch", SMALL), tmp_path / "run")
+    spent = time.process_time() - began
+    state = json.loads((tmp_path / "run/state.json").read_text())
+    kinds = [f"{k}_cpu_seconds" for k in ("learning", "evaluation", "setup")]
+    assert all(state[kind] > 0.0 for kind in kinds)
+    assert state["cpu_seconds"] == pytest.approx(sum(state[kind] for kind in kinds))
+    assert 0.8 * spent < state["cpu_seconds"] <= spent
+    last = rows(tmp_path / "run")[-1]
+    assert float(last["learning_cpu_seconds"]) == pytest.approx(state[kinds[0]])
+
+
+def test_an_older_run_resumes_with_the_columns_that_it_has(tmp_path):
+    folder = tmp_path / "run"
+    train(preset("touch", SMALL), folder)
+    kept = ("steps", "cpu_seconds", "success", "return")
+    old = [",".join(row[name] for name in kept) for row in rows(folder)]
+    (folder / "evaluations.csv").write_text("\n".join([",".join(kept), *old]) + "\n")
+    state = json.loads((folder / "state.json").read_text())
+    names = ("steps", "cpu_seconds", "wall_seconds", "rate", "best")
+    (folder / "state.json").write_text(json.dumps({n: state[n] for n in names}))
+    config = (folder / "config.toml").read_text()
+    (folder / "config.toml").write_text(config.replace("16384", "32768"))
+    train(None, folder)
+    found = rows(folder)
+    assert len(found) > len(old)
+    assert list(found[-1]) == list(kept)
+    assert float(found[-1]["cpu_seconds"]) > state["cpu_seconds"]
+
+
+def test_evaluations_of_a_game_are_a_share_of_its_training():
+    def steps(config):
+        return config.evaluations * config.eval_episodes * len(config.rivals) * 1200
+
+    short, whole = preset("duel", {"total_steps": 600_000}), preset("duel")
+    assert short.evaluations == 1
+    assert 0 < 1.5 * steps(short) <= 0.2 * short.total_steps
+    assert whole.evaluations == 20
+    assert 1.5 * steps(whole) <= 0.2 * whole.total_steps
+    chosen = preset("duel", {"total_steps": 600_000, "evaluations": 5})
+    assert (chosen.evaluations, preset("touch").evaluations) == (5, 20)

@@ -30,6 +30,8 @@ from marl_airhockey.devices.vision.watcher import Watcher
 from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
+FIRST_FRAME = 10.0
+"""Longest time from opening a camera to its first frame, s"""
 MOVED = 2.0
 """Error of the tags, px, at which the camera is not where it was calibrated"""
 BLIND = 0.3
@@ -139,7 +141,7 @@ class RealBackend(Backend):
             raise
 
     def _check_camera(self) -> None:
-        frame = self._camera.next(seconds=3.0)
+        frame = self._camera.next(seconds=FIRST_FRAME)
         if frame is None:
             raise RuntimeError(f"{self._camera.trouble}: is {self.rig.camera} right?")
         off = moved(self.rig.view, find_tags(frame.image), self.rig.known_tags)

@@ -122,8 +122,10 @@ class Camera:
         """Reason why there are no new frames; "" while there are."""
         if self._error:
             return f"camera: {self._error}"
+        if self._frame is None:
+            return "camera: no frame yet"
         if self.age > STALE:
-            return f"camera: no frame for {min(self.age, 99.0):.2f} s"
+            return f"camera: no frame for {self.age:.2f} s"
         return ""
 
     def next(self, after: int = -1, seconds: float = 1.0) -> Frame | None:

@@ -65,7 +65,7 @@ def _train(
     env.seed(config.seed * 10_000 + progress.steps % 9973)
     model.set_logger(logger)
     callback = Evaluations(run)
-    run.start_clock()
+    run.end_setup()
     model.learn(run.steps_left, callback, reset_num_timesteps=False)
     row = callback.evaluate()
     logger.dump(progress.steps)

@@ -72,7 +72,7 @@ class Learner:
 
     def _train(self) -> Metrics:
         run, row = self._run, self._run.latest
-        run.start_clock()
+        run.end_setup()
         while run.steps_left > 0:
             first = run.progress.steps
             last = min(first + REPORT, self._config.total_steps)

@@ -1,0 +1,137 @@
+"""Environment in which policies are measured: that of their training by default."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.registry import find_scenario, runs_code
+from marl_airhockey.toolkit.policies import Policy
+from marl_airhockey.toolkit.trust import is_trusted_code, require_trust
+from marl_airhockey.world.build import Keywords
+
+EVERYWHERE = ("profile", "control_dt", "goals")
+"""Keywords that hold for a policy in any scenario"""
+IN_ITS_SCENARIO = ("options", "physics")
+"""Keywords that hold for a policy in the scenario of its training alone"""
+
+
+def as_trained(
+    players: Mapping[str, Driver],
+    scenario: str | Scenario | None,
+    keywords: Keywords,
+) -> tuple[str | Scenario, Keywords]:
+    """Fill in what is not given with the environment that policies were trained in.
+
+    Args:
+        players: Drivers by name; those that are no policies say nothing.
+        scenario: Scenario that is given, or None.
+        keywords: Keywords that are given; they are never changed. Options and drivers
+            are merged by name.
+
+    Returns:
+        The scenario and the keywords to play with. With a single player, the drivers
+        of other seats are those of its training, too.
+
+    Raises:
+        ValueError: Nothing says what to play, the policies were trained in different
+            environments, or one names Python code that is not trusted.
+    """
+    known = {
+        name: player.trained_in
+        for name, player in players.items()
+        if isinstance(player, Policy) and player.trained_in
+    }
+    if scenario is None:
+        scenario = _agreed("scenario", known)
+        if scenario is None:
+            raise ValueError("--scenario: say what the driver is to play")
+        _require_trust(str(scenario), players)
+    same = {n: t for n, t in known.items() if _is_scenario(t, scenario)}
+    found = {name: _agreed(name, known) for name in EVERYWHERE}
+    found |= {name: _agreed(name, same) for name in IN_ITS_SCENARIO}
+    if len(players) == 1:
+        found["drivers"] = _agreed("drivers", same)
+        for driver in (found["drivers"] or {}).values():
+            _require_trust(str(driver), players)
+    given = cast(dict[str, Any], keywords)
+    if "goals" in given.get("options", {}) or isinstance(scenario, Scenario):
+        del found["goals"]
+    merged = {name: value for name, value in found.items() if value}
+    merged |= given
+    for name in ("options", "drivers"):
+        if found.get(name) and name in given:
+            merged[name] = {**cast(Any, found[name]), **given[name]}
+    return scenario, cast(Keywords, merged)
+
+
+def seen_in(player: Driver, keywords: Keywords) -> Driver:
+    """Return a policy that takes the observations that keywords ask for, if they do."""
+    observe = keywords.get("observe")
+    if observe and isinstance(player, Policy):
+        return replace(player, observe=observe)
+    return player
+
+
+def describe_environment(
+    scenario: str | Scenario,
+    keywords: Keywords,
+    players: Mapping[str, Driver],
+) -> str:
+    """Return one line that names what is played and in which environment."""
+    forms = {p.observe for p in players.values() if isinstance(p, Policy)} - {None}
+    observe = keywords.get("observe") or "/".join(sorted(map(str, forms)))
+    named = scenario if isinstance(scenario, str) else find_scenario(scenario).name
+    parts = [f"profile {keywords.get('profile', 'ideal')}"]
+    parts += [f"observe {observe}"] if observe else []
+    parts.append(f"control_dt {keywords.get('control_dt', 0.05):g} s")
+    for name in (*IN_ITS_SCENARIO, "drivers"):
+        value = keywords.get(name)
+        if isinstance(value, Mapping) and value:
+            parts.append(f"{name} " + " ".join(f"{k}={v}" for k, v in value.items()))
+    return f"{named}: {', '.join(parts)}"
+
+
+def _agreed(name: str, known: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Return the value of all policies that have one; None if none has.
+
+    Raises:
+        ValueError: different values.
+    """
+    found = {player: told[name] for player, told in known.items() if name in told}
+    values = list(found.values())
+    if any(value != values[0] for value in values):
+        listed = ", ".join(f"{player}: {value}" for player, value in found.items())
+        raise ValueError(
+            f"{name}: the policies were trained in different ones ({listed}); say "
+            f"which to take"
+        )
+    return values[0] if values else None
+
+
+def _is_scenario(told: Mapping[str, Any], scenario: object) -> bool:
+    """Return True if a policy was trained in the scenario of a name, or may have been.
+
+    Objects of scenarios have their options already.
+    """
+    if not isinstance(scenario, str):
+        return False
+    trained = told.get("scenario", scenario)
+    return trained == scenario or _resolved(trained) == _resolved(scenario)
+
+
+def _resolved(text: str) -> str:
+    """Return code as training keeps it, with the absolute path of its file."""
+    place, colon, name = text.partition(":")
+    return f"{Path(place).expanduser().resolve()}{colon}{name}"
+
+
+def _require_trust(text: str, players: Mapping[str, Driver]) -> None:
+    """Refuse code that a policy's file names, unless the user has trained with it."""
+    if runs_code(text) and not is_trusted_code(text):
+        source = next(iter(players))
+        require_trust(Path(source), code=f"the name of Python code, {text}")
