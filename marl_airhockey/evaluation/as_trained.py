@@ -102,7 +102,7 @@ def _agreed(name: str, known: Mapping[str, Mapping[str, Any]]) -> Any:
     Raises:
         ValueError: different values.
     """
-    found = {player: told[name] for player, told in known.items() if name in told}
+    found = {player: facts[name] for player, facts in known.items() if name in facts}
     values = list(found.values())
     if any(value != values[0] for value in values):
         listed = ", ".join(f"{player}: {value}" for player, value in found.items())
@@ -113,14 +113,14 @@ def _agreed(name: str, known: Mapping[str, Mapping[str, Any]]) -> Any:
     return values[0] if values else None
 
 
-def _is_scenario(told: Mapping[str, Any], scenario: object) -> bool:
+def _is_scenario(facts: Mapping[str, Any], scenario: object) -> bool:
     """Return True if a policy was trained in the scenario of a name, or may have been.
 
     Objects of scenarios have their options already.
     """
     if not isinstance(scenario, str):
         return False
-    trained = told.get("scenario", scenario)
+    trained = facts.get("scenario", scenario)
     return trained == scenario or _resolved(trained) == _resolved(scenario)
 
 
