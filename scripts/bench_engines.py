@@ -17,17 +17,15 @@ from pathlib import Path
 from typing import Annotated, NamedTuple
 
 import numpy as np
-import ray
 import torch
 import typer
 from rich.console import Console
 from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.engine import AdaptiveRate
-from marl_airhockey.learn.rllib import build_algorithm, start_ray
-from marl_airhockey.learn.rllib_runner import RUNNER_CPU
 from marl_airhockey.learn.sb3 import build_model
 from marl_airhockey.learn.self_play import make_training_env
 
@@ -67,6 +65,9 @@ def rllib(
     scenario: str, worlds: int, folder: Path, runners: int
 ) -> Callable[[], Iteration]:
     """Return a function that runs an iteration of the engine "rllib"."""
+    from marl_airhockey.learn.rllib import build_algorithm
+    from marl_airhockey.learn.rllib_runner import RUNNER_CPU
+
     changes = {"engine": "rllib", "num_env_runners": runners, "num_worlds": worlds}
     algo = build_algorithm(preset(scenario, changes), folder)
 
@@ -85,6 +86,11 @@ def main(
     runners: Annotated[int, typer.Option(help="Most env runners.")] = 2,
 ) -> None:
     """Measure all trainers and print a table."""
+    require("ray", "distributed")
+    import ray
+
+    from marl_airhockey.learn.rllib import start_ray
+
     torch.set_num_threads(1)
     start_ray(2 * runners + 1)
     folder = Path(tempfile.mkdtemp())

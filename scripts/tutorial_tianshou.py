@@ -64,9 +64,9 @@ def main(
     def act(observation: object) -> object:
         return policy.compute_action(observation)
 
-    env = ah.parallel_env(task, drivers={"paddle_0": act})
-    env.reset(seed=0)
-    print("drives a paddle of ours:", env.world.driven[0].driver)
+    world = ah.make_world(task, drivers={"paddle_0": act})
+    world.reset(seed=0)
+    print("drives a paddle of ours:", world.driven[0].driver)
 
 
 if __name__ == "__main__":

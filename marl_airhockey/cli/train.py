@@ -124,6 +124,7 @@ def _tell_updates(steps: int, config: TrainConfig, changes: dict[str, Any]) -> N
 
 def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
     """Train, or resume a run for None, and print the result."""
+    finished = config is None and _is_finished(folder)
     row = train_with_progress(config, folder)
     measure = measure_of(row)
     if as_json:
@@ -133,6 +134,12 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
         kind: row.get(f"{kind}_cpu_seconds", 0.0) / 60
         for kind in ("learning", "evaluation", "setup")
     }
+    if finished:
+        console.print(
+            f"{folder}: this run was finished already; to train on, begin another one "
+            f"with its weights: airhockey train SCENARIO --init {folder}",
+            soft_wrap=True,
+        )
     parts = ", ".join(f"{kind} {value:.2f}" for kind, value in minutes.items())
     console.print(
         f"{folder}: {measure} {row[measure]:.3f} after {row['steps']:,.0f} steps "
@@ -140,6 +147,15 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
         soft_wrap=True,
     )
     console.print(f"next: airhockey evaluate {folder}", soft_wrap=True)
+
+
+def _is_finished(folder: Path) -> bool:
+    """Return True for the folder of a run that has made all of its steps."""
+    from marl_airhockey.learn.algorithms import load_any_config
+    from marl_airhockey.learn.run import Progress
+
+    state, config = folder / "state.json", load_any_config(folder)
+    return state.exists() and Progress.load(state).steps >= config.total_steps
 
 
 @app.command()
@@ -151,7 +167,9 @@ def export(
     ] = None,
     trust: Trusting = False,
 ) -> None:
-    """Freeze a trained policy into one small file with a card, measured anew."""
+    """Freeze a trained policy into one small file, .npz or .onnx, with a card."""
+    if not (run / "config.toml").exists():
+        raise ValueError(f"{run}: there is no training run; name the folder of one")
     require("stable_baselines3", "train")
     from marl_airhockey.learn.export import export_policy
 

@@ -10,9 +10,9 @@ import numpy as np
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.state import State
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
+from marl_airhockey.envs.seats import check_one_open
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords
-from marl_airhockey.world.world import World
 
 
 class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
@@ -54,8 +54,8 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; options as those of `AirHockeyEnv.reset`."""
-        super().reset(seed=seed)
         observation, info = self.parallel.reset(seed, options)
+        super().reset(seed=seed)
         return observation[self.agent], self._named(info)
 
     @property
@@ -100,21 +100,6 @@ class AirHockeyGoalEnv(AirHockeySingleEnv):
         scenario = self.parallel.world.scenario
         assert isinstance(scenario, GoalScenario)
         return np.asarray(scenario.shown_reward(achieved, desired), np.float32)
-
-
-def check_one_open(world: World) -> None:
-    """Refuse a world that does not leave exactly one seat open.
-
-    Raises:
-        ValueError: says what to do.
-    """
-    if len(world.open) != 1:
-        agents = [f"paddle_{i}" for i in world.open]
-        raise ValueError(
-            f"{world.scenario.name!r} has open seats {agents}; a single-agent "
-            "environment needs exactly one: give the others drivers, e.g. "
-            'drivers={"paddle_1": "still"}'
-        )
 
 
 def make_single(

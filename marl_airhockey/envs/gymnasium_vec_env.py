@@ -11,11 +11,11 @@ from gymnasium.vector.utils import batch_space
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.state import State
-from marl_airhockey.envs.gymnasium_env import check_one_open
 from marl_airhockey.envs.infos import infos_of
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.pictures import Pictures
 from marl_airhockey.envs.reset_options import reset_world
+from marl_airhockey.envs.seats import check_one_open
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world

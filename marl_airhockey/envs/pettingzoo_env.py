@@ -14,6 +14,7 @@ from marl_airhockey.core.state import State
 from marl_airhockey.envs.global_state import GlobalState
 from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
+from marl_airhockey.envs.seats import check_some_open
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
@@ -63,6 +64,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, 1, autoreset=False, keywords=keywords)
+        check_some_open(self.world)
         fps = round(1 / self.world.control_dt)
         game = self.world.scenario
         name = f"{game.name}_v{game.version}"
@@ -144,16 +146,22 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         Raises:
             ValueError: a misspelt option, or a state that does not fit, named.
         """
+        observation = reset_world(self.world, seed, options)
         if seed is not None:
             self.np_random = np.random.default_rng(seed)
-        observation = reset_world(self.world, seed, options)
         self.agents = self.possible_agents[:]
         self._begin_pictures()
         return self._dict(observation), self._infos(self.world.no_step())
 
     @property
     def physics(self) -> dict[str, float]:
-        """Physical parameters of the episode by name."""
+        """Physical parameters of the episode by name.
+
+        Raises:
+            RuntimeError: before the first `reset`, which samples them.
+        """
+        if not self.world.episode.number[0]:
+            raise RuntimeError("physics: call reset() first, which samples them")
         return {k: float(v[0]) for k, v in self.world.episode.physics.items()}
 
     def get_state(self) -> tuple[State, Memory]:
@@ -189,6 +197,8 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         if not self.agents:
             if not actions and self.world.episode.number[0]:
                 return {}, {}, {}, {}, {}
+            if self.world.episode.number[0]:
+                raise RuntimeError("step: the episode has ended; call reset()")
             raise RuntimeError("step: call reset() first; no episode is running")
         result = self.world.step(self._array(actions))
         agents, reward = self.agents, result.reward

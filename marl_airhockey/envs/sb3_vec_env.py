@@ -12,6 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.state import State
 from marl_airhockey.envs.pictures import Pictures
+from marl_airhockey.envs.seats import check_some_open
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
@@ -40,6 +41,7 @@ class AirHockeyVecEnv(VecEnv):
         **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, num_worlds, True, keywords)
+        check_some_open(self.world)
         self.seats = len(self.world.open)
         self.render_mode = render_mode
         self._pictures = Pictures(self.world, render_mode)

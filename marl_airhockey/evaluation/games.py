@@ -113,7 +113,13 @@ def play_games(
     world = build_world(scenario, games, autoreset=False, keywords=keywords or {})
     teams = teams_of([seat.team for seat in world.scene.seats])
     if teams.max() == 0:
-        raise ValueError(f"{scenario!r} has no teams that play against each other")
+        together = len(teams) > 1
+        instead = (
+            f"airhockey crossplay {scenario}" if together else "airhockey evaluate"
+        )
+        raise ValueError(
+            f"{scenario!r} has no teams that play against each other; try {instead}"
+        )
     if lineups.shape != (games, teams.max() + 1):
         raise ValueError(f"{scenario!r} is played by {teams.max() + 1} teams")
     roster = Roster(world)

@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
@@ -25,16 +26,22 @@ GAMES = 200
 
 
 def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> NumpyPolicy:
-    """Write a policy of a run as .npz, measured on seeds unseen in training.
+    """Write a policy of a run, measured on seeds unseen in training.
 
     Args:
         run: folder of a run of `train`.
-        out: the .npz to write.
+        out: the .npz or .onnx to write.
         checkpoint: one of the run's ``checkpoints``; None for its last policy.
 
     Raises:
-        ValueError: no run, one of an older version, or a policy that has no numpy form.
+        ValueError: no run, one of an older version, a policy that has no numpy form, or
+            a file of another kind.
+        RuntimeError: onnx is missing, with the line that installs it.
     """
+    if out.suffix not in (".npz", ".onnx"):
+        raise ValueError(f"out: {out} must end in .npz or .onnx")
+    if out.suffix == ".onnx":
+        require("onnx", "offline")
     config = load_config(run / "config.toml")
     if not (run / "state.json").exists():
         raise ValueError(f"{run}: there is no policy in it yet; train it first")
@@ -57,7 +64,12 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
     }
     frozen = NumpyPolicy(last.layers, last.centre, last.unit, last.log_std, card)
     out.parent.mkdir(parents=True, exist_ok=True)
-    frozen.save(out)
+    if out.suffix == ".onnx":
+        from marl_airhockey.learn.onnx_export import save_onnx
+
+        save_onnx(frozen, out)
+    else:
+        frozen.save(out)
     return frozen
 
 

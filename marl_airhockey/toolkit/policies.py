@@ -313,6 +313,10 @@ def _predict_sb3(policy: Any, observation: Any, deterministic: bool) -> Array:
     return np.asarray(policy.predict(observation, deterministic=deterministic)[0])
 
 
+ONNX_CARD = "card"
+"""Name of the metadata of an ONNX model that holds the card of a policy of ours"""
+
+
 class _OnnxModel:
     """ONNX model; copies and pickles hold its bytes and open a new session."""
 
@@ -337,6 +341,16 @@ class _OnnxModel:
         )
         self.inputs = self._session.get_inputs()
 
+    @property
+    def card(self) -> dict[str, Any]:
+        """Card of a policy of ours; empty for other models."""
+        metadata = self._session.get_modelmeta().custom_metadata_map
+        try:
+            found = json.loads(metadata.get(ONNX_CARD, "{}"))
+        except ValueError:
+            return {}
+        return found if isinstance(found, dict) else {}
+
     def __call__(self, observation: Any, deterministic: bool) -> Array:
         rows = np.asarray(observation, np.float32)
         out = np.asarray(self._session.run(None, {self.inputs[0].name: rows})[0])
@@ -359,4 +373,7 @@ def _load_onnx(path: Path, deterministic: bool) -> Policy:
     sizes = model.inputs[0].shape[1:]
     shape = tuple(n for n in sizes if isinstance(n, int))
     known = shape if len(shape) == len(sizes) else None
-    return Policy(model, known, None, str(path), deterministic)
+    card = model.card
+    policy = Policy(model, known, card.get("observe"), str(path), deterministic)
+    policy.trained_in = trained_in(card)
+    return policy

@@ -99,8 +99,11 @@ def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
     recordings = [read_recording(path) for path in paths]
     names = {recording.head["scenario"] for recording in recordings}
     if len(names) != 1:
-        found = ", ".join(sorted(names)) or f"no recordings ({SUFFIX} files)"
-        raise ValueError(f"recordings of one scenario are needed, there are: {found}")
+        found = ", ".join(sorted(names)) or f"none ({SUFFIX} files)"
+        raise ValueError(
+            f"fit: recordings of one scenario are needed, found: {found}; "
+            "airhockey data record makes them"
+        )
     scenario = scenario_of(recordings[0])
     episodes = [e.columns for r in recordings for e in r.episodes if len(e)]
     parts = [

@@ -137,7 +137,8 @@ class _SegmentModel:
         if len(self.rows) < MIN_SEGMENTS:
             raise ValueError(
                 f"fit: {len(self.rows)} segments of {SEGMENT_SECONDS} s are too few; "
-                f"at least {MIN_SEGMENTS} are needed: play longer (--steps)"
+                f"at least {MIN_SEGMENTS} are needed: play longer (--steps), or give "
+                "more recordings"
             )
         kind = find_backend("numba")
         self._backend = kind(play.scene, len(self.rows), play.control_dt)

@@ -50,6 +50,13 @@ class Observer:
         self.scenario, self.sensor, self.observe = scenario, sensor, observe
         self._top_speed = physics.highest("paddle_speed")
         steps = round(scenario.reaction / sensor.control_dt)
+        if abs(steps * sensor.control_dt - scenario.reaction) > 1e-6:
+            near = [k * sensor.control_dt for k in (steps, steps + 1)]
+            raise ValueError(
+                f"reaction: {scenario.reaction:g} s is no multiple of control_dt, "
+                f"{sensor.control_dt:g} s; give another control_dt or an option, e.g. "
+                f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
+            )
         self._perception = Perception(steps) if steps else None
         self.reaction = steps * sensor.control_dt
         """s by which seats see late"""

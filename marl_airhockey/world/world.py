@@ -125,6 +125,11 @@ class World:
         return {name: term.copy() for name, term in terms.items()}
 
     @property
+    def observation_labels(self) -> tuple[str, ...]:
+        """Name of each element of an open seat's flat observation; or none."""
+        return self.observer.labels
+
+    @property
     def max_cycles(self) -> int:
         """Length of an episode in control steps."""
         return int(self._limit[0])

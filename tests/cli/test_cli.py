@@ -3,12 +3,15 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
 from command import airhockey
 
 import marl_airhockey as ah
 from marl_airhockey.envs.meanings import term_meanings
+from marl_airhockey.toolkit.policies import load_policy
 
 
 def process(*words, ok=True, cwd=None):
@@ -87,6 +90,20 @@ def test_demo_makes_what_it_says(tmp_path):
         (("data", "report", "nowhere"), "no such folder"),
         (("watch", "nowhere.rec"), "cannot be read"),
         (("league", "duel", "--games", "0"), "--games"),
+        (("league", "rally"), "try airhockey crossplay rally"),
+        (("export", "nowhere"), "nowhere: there is no training run"),
+        (
+            ("fit", "--recordings", "nowhere"),
+            "found: none (.rec files); airhockey",
+        ),
+        (
+            ("evaluate", "still", "-s", "touch", "--physics", "tilt=a:b"),
+            "--physics tilt=a:b: expected NAME=VALUE or NAME=LOW:HIGH",
+        ),
+        (
+            ("fit", "juggle", "--backend", "numba", "--steps", "20"),
+            "play longer (--steps), or give more recordings",
+        ),
         (("watch", "still", "-s", "reach", "--video", "a.avi"), "must end in"),
     ],
 )
@@ -176,3 +193,36 @@ def test_meanings_are_those_of_the_nearest_class():
     assert meanings["touch"] == "5 for each touch, even a late one."
     assert meanings["drop"] == "-1 when the puck passes the home line."
     assert meanings["jitter"].startswith("``-jitter_weight``")
+
+
+def test_physics_takes_presets_values_and_ranges():
+    words = ("evaluate", "still", "-s", "touch", "--no-floors", "--episodes", "2")
+    asked = ("--physics", "wooden", "--physics", "tilt=3:6", "--physics", "puck_drag=0")
+    line = airhockey(*words, *asked).stdout.splitlines()[0]
+    assert "physics preset=wooden tilt=(3.0, 6.0) puck_drag=0.0" in line
+
+
+def test_resuming_a_finished_run_says_how_to_train_on(touch_run):
+    said = airhockey("train", "--resume", touch_run).stdout
+    assert "this run was finished already" in said
+    assert f"--init {touch_run}" in said
+
+
+def test_an_exported_onnx_model_acts_as_the_run_and_knows_its_card(touch_run, tmp_path):
+    path = tmp_path / "touch.onnx"
+    airhockey("export", touch_run, "--out", path)
+    model, run = load_policy(path), load_policy(touch_run / "last.npz")
+    observation = np.random.default_rng(0).normal(size=(50, *run.shape))
+    expected = np.clip(run.predict(observation, True), -1.0, 1.0)
+    np.testing.assert_allclose(model.predict(observation, True), expected, atol=1e-5)
+    assert (model.observe, model.trained_in["scenario"]) == ("velocity", "touch")
+    done = airhockey("export", touch_run, "--out", tmp_path / "touch.pt", ok=False)
+    assert "must end in .npz or .onnx" in done.stderr
+
+
+def test_the_benchmark_of_engines_says_what_it_is_without_ray():
+    script = Path(__file__).parents[2] / "scripts/bench_engines.py"
+    done = subprocess.run(
+        [sys.executable, script, "--help"], capture_output=True, text=True, check=True
+    )
+    assert "Measure all trainers" in done.stdout

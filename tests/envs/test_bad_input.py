@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cached_property
 
+import gymnasium
 import numpy as np
 import pytest
 from pair import Pair
@@ -49,6 +50,25 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
             "unknown physics preset",
         ),
         (lambda: ah.evaluate("still", "juggle", episodes=0), "episodes: 0 must be"),
+        (
+            lambda: ah.parallel_env("juggle", drivers={"paddle_0": "still"}),
+            "every seat of 'juggle' has one",
+        ),
+        (
+            lambda: ah.make_sb3_vec("juggle", drivers={"paddle_0": "still"}),
+            "every seat of 'juggle' has one",
+        ),
+        (
+            lambda: ah.gym_env("juggle", drivers={"paddle_0": "still"}),
+            "every seat of 'juggle' has one",
+        ),
+        (
+            lambda: ah.parallel_env("duel", options={"reaction": 0.12}),
+            'no multiple of control_dt, 0.05 s; .*"reaction": 0.1} or 0.15',
+        ),
+        (lambda: ah.league("rally", ["still", "random"]), "airhockey crossplay rally"),
+        (lambda: ah.parallel_env("juggle").reset(seed="abc"), "seed: 'abc' is no"),
+        (lambda: ah.gym_env("juggle").reset(seed="abc"), "seed: 'abc' is no whole"),
         (lambda: ah.league("duel", ["still", "random"], games=3), "an even number"),
         (lambda: ah.parallel_env("juggle", observ="velocity"), "there are: observe"),
         (lambda: ah.parallel_env("juggle", observe="speed"), "unknown observe 'speed'"),
@@ -285,3 +305,29 @@ class Alone(Driver):
 
     def act(self, view, memory):
         return np.zeros((len(view.reach), 2))
+
+
+def test_physics_is_there_from_the_first_reset_on():
+    for env in (ah.parallel_env("touch"), ah.gym_env("touch")):
+        with pytest.raises(RuntimeError, match="physics: call reset"):
+            _ = env.physics
+        env.reset(seed=0)
+        assert env.physics["tilt"] == 5.5
+
+
+def test_a_step_after_the_end_says_that_the_episode_has_ended():
+    env = ah.parallel_env("touch", max_cycles=1)
+    with pytest.raises(RuntimeError, match="no episode is running"):
+        env.step(GOOD)
+    env.reset(seed=0)
+    env.step(GOOD)
+    with pytest.raises(RuntimeError, match="the episode has ended; call reset"):
+        env.step(GOOD)
+
+
+def test_labels_are_found_where_readme_says():
+    expected = ah.parallel_env("touch").observation_labels("paddle_0")
+    made = gymnasium.make("marl_airhockey/Touch-v0")
+    assert made.unwrapped.observation_labels == expected
+    assert ah.make_world("touch").observation_labels == expected
+    assert ah.make_vec("touch").observation_labels == expected

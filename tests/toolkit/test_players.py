@@ -57,9 +57,9 @@ def test_a_function_of_goals_and_one_of_pixels_drive():
             seen.append(observation)
             return np.zeros(2)
 
-        env = ah.parallel_env("reach", drivers={"paddle_0": act}, **keywords)
-        env.reset(seed=0)
-        env.world.step(np.zeros((1, 0, 2)))
+        world = ah.make_world("reach", drivers={"paddle_0": act}, **keywords)
+        world.reset(seed=0)
+        world.step(np.zeros((1, 0, 2)))
         shown = seen[-1]
         if shape:
             assert shown.shape == shape
