@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from marl_airhockey.cli.options import bar
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.cli.real_table import rig_of
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.seat import make_seat

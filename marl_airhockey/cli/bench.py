@@ -13,9 +13,9 @@ from marl_airhockey.cli.options import (
     AsJson,
     Workers,
     app,
-    bar,
     console,
 )
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
 
 

@@ -12,6 +12,7 @@ import typer
 
 from marl_airhockey.cli import play as cli_play
 from marl_airhockey.cli.options import console
+from marl_airhockey.cli.progress import waiting
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.camera import Camera, open_source
@@ -155,7 +156,7 @@ def _devices(
     from marl_airhockey.lab.calibration.lab_rig import running_lab
 
     with (
-        console.status("opening the lab (longer when it is the first time)"),
+        waiting("opening the lab (longer when it is the first time)"),
         running_lab() as client,
     ):
         info = client.ask("info")

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from marl_airhockey import __version__
-from marl_airhockey.cli.options import AsJson, Trusting, app, bar, console
+from marl_airhockey.cli.options import AsJson, Trusting, app, console
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.card import Result
 from marl_airhockey.evaluation.challenge import (

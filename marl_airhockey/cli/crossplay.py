@@ -20,6 +20,7 @@ from marl_airhockey.cli.options import (
     console,
     environment,
 )
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.evaluation.crossplay import CrossPlay, play_together
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
@@ -40,7 +41,13 @@ def crossplay(
     keywords = environment(backend, profile, option, driver)
     mates = {name: make_agent(name) for name in players}
     _, keywords, mates = as_trained_unless_given(mates, scenario, keywords, as_json)
-    found = play_together(scenario, mates, episodes, keywords=keywords)
+    with bar() as progress:
+        task = progress.add_task("pairs", total=len(mates) ** 2, note="")
+        found = play_together(
+            *(scenario, mates, episodes),
+            keywords=keywords,
+            report=lambda pairs: progress.update(task, completed=pairs),
+        )
     if as_json:
         console.print_json(json.dumps(found.to_json()))
         return

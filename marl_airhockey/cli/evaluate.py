@@ -24,10 +24,10 @@ from marl_airhockey.cli.options import (
     Workers,
     app,
     as_trained_unless_given,
-    bar,
     console,
     environment,
 )
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.cli.real_table import (
     REAL,
     LabOption,

@@ -10,6 +10,7 @@ import typer
 
 from marl_airhockey.cli import play as cli_play
 from marl_airhockey.cli.options import console
+from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import REAL, name_on_table, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.lab.faults import FAULTS
@@ -47,7 +48,7 @@ def open_lab(
     if running is not None:
         running.close()
         raise RuntimeError("lab: one is running already; end it first")
-    with console.status("opening the lab (longer when it is the first time)"):
+    with waiting("opening the lab (longer when it is the first time)"):
         opened = Lab(seed=seed, frame_rate=frame_rate)
     # Ctrl+C may come as soon as the door is open, so it is caught around all of it.
     with contextlib.suppress(KeyboardInterrupt), opened, served(opened):

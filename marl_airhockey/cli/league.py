@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 from pathlib import Path
 from typing import Annotated
 
@@ -16,10 +17,10 @@ from marl_airhockey.cli.options import (
     Profile,
     Trusting,
     as_trained_unless_given,
-    bar,
     console,
     environment,
 )
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, play_league
 from marl_airhockey.evaluation.standings import Standings
@@ -73,7 +74,12 @@ def league(
     _, keywords, entrants = as_trained_unless_given(
         entrants, scenario, keywords, as_json
     )
-    standings = play_league(scenario, entrants, games, seed, keywords)
+    with bar() as progress:
+        task = progress.add_task(f"league of {len(entrants)}", total=1.0, note="")
+        standings = play_league(
+            *(scenario, entrants, games, seed, keywords),
+            lambda share: progress.update(task, completed=share),
+        )
     files = standings.save(out)
     responses: dict[str, list[float]] = {}
     if exploit:
@@ -118,13 +124,18 @@ def best_responses(
 
     found: dict[str, list[float]] = {name: [] for name in names}
     with bar() as progress:
-        task = progress.add_task("best responses", total=seeds * len(names), note="")
-        for number, name in enumerate(names):
+        total = seeds * len(names)
+        task = progress.add_task("best responses", total=total, note="")
+        for number, (name, seed) in enumerate(product(names, range(seeds))):
+
+            def report(
+                done: int, of: int, row: dict[str, float], number: int = number
+            ) -> None:
+                progress.update(task, completed=number + done / of)
+
             progress.update(task, note=name)
-            for seed in range(seeds):
-                run = out / "responses" / f"{number}-{steps}-{seed}"
-                found[name].append(best_response(scenario, name, steps, run, seed))
-                progress.advance(task)
+            run = out / "responses" / f"{number // seeds}-{steps}-{seed}"
+            found[name].append(best_response(scenario, name, steps, run, seed, report))
     return found
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
+from marl_airhockey.cli.progress import bar, errors
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.physics import load_physics
 from marl_airhockey.evaluation.as_trained import (
@@ -31,8 +31,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 console = Console()
-errors = Console(stderr=True)
-"""Console of messages that are no results, so that output can be piped"""
 
 Scenario = Annotated[
     str | None,
@@ -204,18 +202,6 @@ def as_trained_unless_given(
 def measure_of(row: dict[str, float]) -> str:
     """Return the name of the measure in a row of training: "success" or "score"."""
     return "success" if "success" in row else "score"
-
-
-def bar() -> Progress:
-    """Return a progress bar on standard error, so that output can be piped."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-        console=errors,
-    )
 
 
 def train_with_progress(config: AnyConfig | None, folder: Path) -> Metrics:

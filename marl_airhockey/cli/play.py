@@ -22,6 +22,7 @@ from marl_airhockey.cli.options import (
     environment,
     settings,
 )
+from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, Handicap
@@ -104,7 +105,7 @@ def play(
     with real_table(keywords, lab, rig) as table:
         match = kind(scenario, {}, table, handicap)
         seat_drivers(match, opponent, seats)
-        with console.status("preparing the table (longer when it is the first time)"):
+        with waiting("preparing the table (longer when it is the first time)"):
             match.warm_up()
         host_match(match, record, host, port, browser)
 

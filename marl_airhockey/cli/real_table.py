@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli.options import console
+from marl_airhockey.cli.progress import waiting
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.registry import zoo_names
 from marl_airhockey.world.build import Keywords
@@ -81,7 +81,7 @@ def rig_of(lab: bool, rig: Path | None) -> Iterator[Path]:
         raise ValueError("which real table? --lab, or --rig FILE")
     from marl_airhockey.lab.calibration.lab_rig import lab_rig
 
-    with console.status("opening the lab (longer when it is the first time)"):
+    with waiting("opening the lab (longer when it is the first time)"):
         opened = lab_rig()
         path = opened.__enter__()
     try:

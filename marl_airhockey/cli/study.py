@@ -10,6 +10,7 @@ from rich.table import Table
 
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.play import Browser, Host, Port, host_table
+from marl_airhockey.cli.progress import waiting
 from marl_airhockey.core.errors import require
 
 study = typer.Typer(
@@ -74,7 +75,7 @@ def run(
 
     plan = load_plan(file)
     claim_folder(out, file)
-    with console.status("preparing the table (longer when it is the first time)"):
+    with waiting("preparing the table (longer when it is the first time)"):
         session = Study(plan, out)
     host_table(
         lambda access: application(session, access), plan.title, host, port, browser

@@ -14,9 +14,9 @@ from marl_airhockey.cli.options import (
     Backend,
     Options,
     Profile,
-    console,
     environment,
 )
+from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
 
@@ -74,7 +74,7 @@ def teleop(
             f"shadow:rig={path},prescribe={str(not real).lower()}" if path else PERSON
         )
         cli_play.seat_drivers(match, opponent, {"paddle_0": leader})
-        with console.status("preparing the table (longer when it is the first time)"):
+        with waiting("preparing the table (longer when it is the first time)"):
             match.warm_up()
         cli_play.host_match(match, out, host, port, browser, film)
 
@@ -99,7 +99,7 @@ def hand_file(wanted: bool, hand: Path | None, lab: bool) -> Iterator[Path | Non
         raise ValueError("--by shadow: which camera? --hand FILE, or --lab")
     from marl_airhockey.lab.calibration.lab_rig import hand_rig
 
-    with console.status("opening the lab (longer when it is the first time)"):
+    with waiting("opening the lab (longer when it is the first time)"):
         opened = hand_rig()
         path = opened.__enter__()
     try:

@@ -18,13 +18,13 @@ from marl_airhockey.cli.options import (
     Trusting,
     Workers,
     app,
-    bar,
     console,
     measure_of,
     physics_of,
     settings,
     train_with_progress,
 )
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario
 

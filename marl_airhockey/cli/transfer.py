@@ -15,12 +15,12 @@ from marl_airhockey.cli.options import (
     Physics,
     Trusting,
     Workers,
-    bar,
     console,
     physics_of,
     settings,
     train_with_progress,
 )
+from marl_airhockey.cli.progress import bar, waiting
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.parameters import PARAMETERS
@@ -247,10 +247,10 @@ def fit(
     else:
         player = make_agent(driver or f"zoo/{scenario}")
         there = physics_of(physics)
-        with console.status(f"playing {steps} steps on {backend}"):
+        with waiting(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}
             seen = record_play(scenario, player, steps, seed, keywords)
-    with console.status("fitting"):
+    with waiting("fitting"):
         found = fit_physics(seen)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(found.to_toml())
@@ -287,7 +287,7 @@ def _fit_rows(
     if delays and base is None:
         raise ValueError("--delays: add --base, the profile that has the rest")
     measured = read_delays(delays) if delays else None
-    with console.status("fitting"):
+    with waiting("fitting"):
         tracks = [read_track(path, TABLES[table], origin) for path in paths]
         found = fit_corrected(tracks, TABLES[table])
     count = sum(len(track.time) for track in tracks)

@@ -20,11 +20,11 @@ from marl_airhockey.cli.options import (
     Trusting,
     app,
     as_trained_unless_given,
-    bar,
     console,
     environment,
 )
 from marl_airhockey.cli.options import Scenario as ScenarioOption
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.cli.real_table import (
     LabOption,
     RigOption,

@@ -10,7 +10,8 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli.options import Backend, app, bar
+from marl_airhockey.cli.options import Backend, app
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, scenario_names
 from marl_airhockey.world.build import Keywords, compile_world
 

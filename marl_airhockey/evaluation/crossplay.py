@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,6 +78,7 @@ def play_together(
     episodes: int = 200,
     seed: int = TEST_SEED,
     keywords: Keywords | None = None,
+    report: Callable[[int], None] = lambda pairs: None,
 ) -> CrossPlay:
     """Let every player play with every other as its mate, and with itself.
 
@@ -87,6 +88,7 @@ def play_together(
         episodes: number of episodes of each pair, with the same seeds for all.
         seed: seed of the first one.
         keywords: keywords of the environment; its drivers fill other teams' seats.
+        report: called after each pair with their number so far.
 
     Raises:
         ValueError: a single player, a team of one, or a seat without a driver.
@@ -106,4 +108,5 @@ def play_together(
             seated: Keywords = {**keywords, "drivers": drivers}
             found = evaluate(player, name, scenario, episodes, seed, seated)
             returns[i, j], success[i, j] = found.returns, found.success
+            report(i * len(players) + j + 1)
     return CrossPlay(scenario, tuple(players), episodes, returns, success)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
 
@@ -96,6 +97,7 @@ def play_games(
     lineups: Array,
     seed: int,
     keywords: Keywords | None = None,
+    report: Callable[[float], None] = lambda share: None,
 ) -> GameResults:
     """Play G games to their ends, all at once.
 
@@ -105,6 +107,7 @@ def play_games(
         lineups: (G, T) number of the player of each team in each game.
         seed: seed of the first game; game i has seed + i.
         keywords: keywords of the environment, see `build_world`.
+        report: called after every control step with the share of the longest game.
 
     Raises:
         ValueError: a scenario without teams that play each other.
@@ -133,7 +136,7 @@ def play_games(
     lasted = np.full(lineups.shape, np.inf)
     seconds, playing = np.zeros(games), np.ones(games, np.bool_)
     actions = np.zeros((games, len(teams), 2))
-    while playing.any():
+    for step_number in count(1):
         roster.ask(actions)
         step = world.step(actions)
         retired, now = world.retired, world.state.time[:, None]
@@ -148,5 +151,8 @@ def play_games(
         margin[ended] = world.episode.returns[ended][:, first]
         seconds[ended] = world.state.time[ended]
         playing &= ~ended
+        report(step_number / world.max_cycles)
+        if not playing.any():
+            break
     world.close()
     return GameResults(won, margin, lasted, seconds)

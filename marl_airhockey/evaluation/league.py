@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import combinations, permutations
 from pathlib import Path
 
@@ -28,6 +28,7 @@ def play_league(
     games: int = 100,
     seed: int = LEAGUE_SEED,
     keywords: Keywords | None = None,
+    report: Callable[[float], None] = lambda share: None,
 ) -> Standings:
     """Let every player play every other.
 
@@ -41,6 +42,7 @@ def play_league(
             sides; of two, they change ends at half of them.
         seed: seed of the first game.
         keywords: keywords of the environment.
+        report: called again and again with the share of the games that is played.
 
     Raises:
         ValueError: a single player, an odd number of games, or a scenario without
@@ -56,13 +58,18 @@ def play_league(
     scene = scenario_of(scenario, keywords or {}).scene
     sides = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
     lineups = lineups_of(count, max(sides, 2), games, seed)
-    results = GameResults.joined(
-        [
-            play_games(scenario, list(players.values()), some, seed + first, keywords)
-            for first in range(0, len(lineups), BATCH)
-            for some in [lineups[first : first + BATCH]]
-        ]
-    )
+    batches = []
+    for first in range(0, len(lineups), BATCH):
+        some = lineups[first : first + BATCH]
+
+        def share_of_all(
+            share: float, done: int = first, more: int = len(some)
+        ) -> None:
+            report((done + share * more) / len(lineups))
+
+        those = list(players.values()), some, seed + first, keywords
+        batches.append(play_games(scenario, *those, share_of_all))
+    results = GameResults.joined(batches)
     wins, draws, margin = compared(results, lineups, count)
     low, ratings, high = _ratings(wins, draws, sides - 1, seed)
     spread = np.stack([low, high], -1)

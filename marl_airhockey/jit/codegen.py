@@ -9,9 +9,8 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -20,6 +19,7 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from marl_airhockey.jit.cache import code_folder, compiled, one_process
+from marl_airhockey.jit.notices import announced_compilation, announced_wait
 from marl_airhockey.jit.tracer import Symbol, Tape
 from marl_airhockey.types import Array
 
@@ -189,7 +189,9 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
             _loaded[digest] = _compile(source, path, names)
         else:
             # Another process that needs it too waits, and then finds it.
-            with one_process(path.stem):
+            with ExitStack() as stack:
+                with announced_wait(name):
+                    stack.enter_context(one_process(path.stem))
                 _compile_first(source, path, name, names)
     return _loaded[digest]
 
@@ -199,10 +201,12 @@ def _compile_first(
 ) -> None:
     """Compile a module that was not in the cache, and write its source there."""
     digest = path.stem.removeprefix("loop_")
-    if not path.exists() and time.monotonic() - _compiled.get(name, -np.inf) > PAUSE:
-        print(f"marl_airhockey: compiling {name} once", file=sys.stderr)
-    _loaded[digest] = _compile(source, path, names)
-    _compiled[name] = time.monotonic()
+    if path.exists():
+        _loaded[digest] = _compile(source, path, names)
+        return
+    first = not any(path.parent.glob("*.nbi"))
+    with announced_compilation(name, first):
+        _loaded[digest] = _compile(source, path, names)
     # The source comes last: where it is, its compiled code is, too.
     with suppress(OSError):
         part = path.with_suffix(f".{os.getpid()}")
@@ -222,8 +226,3 @@ def _compile(source: str, path: Path, names: Mapping[str, Any] | None) -> Loaded
         kernel.compile(module.SIGNATURE)
         kernel.disable_compile()
     return Loaded(kernel, module)
-
-
-PAUSE = 2.0
-"""Time after a compilation (s) from which the next one of its name is announced."""
-_compiled: dict[str, float] = {}

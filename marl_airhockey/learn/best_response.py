@@ -6,6 +6,7 @@ from pathlib import Path
 
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.config import load_config, preset
+from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_agent
 from marl_airhockey.toolkit.policies import load_policy
@@ -18,7 +19,12 @@ SEED = 4_000_000
 
 
 def best_response(
-    scenario: str, player: str, steps: int, folder: Path, seed: int = 0
+    scenario: str,
+    player: str,
+    steps: int,
+    folder: Path,
+    seed: int = 0,
+    report: ProgressCallback | None = None,
 ) -> float:
     """Train a policy against a fixed player and return its score against it.
 
@@ -31,6 +37,7 @@ def best_response(
         steps: steps of single worlds.
         folder: folder of the run; a run that is there already is not trained again.
         seed: seed of worlds and network.
+        report: called during training, see `train`.
 
     Returns:
         The response's share of won games, a draw shared by all sides: of two sides 0.5
@@ -45,7 +52,7 @@ def best_response(
         only = {"opponents": [player], "rivals": [player]}
         alone = {"mirror": 0.0, "script_share": 1.0, "snapshots": 1}
         length = {"total_steps": steps, "seed": seed, "evaluations": 4}
-        train(preset(scenario, {**only, **alone, **length}), folder)
+        train(preset(scenario, {**only, **alone, **length}), folder, report)
     response, rivals = load_policy(folder / "last.npz"), [make_agent(player)]
     keywords: Keywords = {"backend": "numba"}
     score, _ = play_against(scenario, response, rivals, GAMES, SEED, keywords)

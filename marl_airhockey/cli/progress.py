@@ -1,0 +1,123 @@
+"""Progress of what takes long: a bar in a terminal, else a line every ten seconds."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+errors = Console(stderr=True)
+"""Console of messages that are no results, so that output can be piped"""
+EVERY = 10.0
+"""Time between two lines, s"""
+
+
+@dataclass
+class Lines:
+    """Progress of one task as lines of text, with the same calls as a bar of rich's."""
+
+    description: str = ""
+    total: float | None = None
+    completed: float = 0.0
+    note: str = ""
+    began: float = 0.0
+
+    def add_task(self, description: str, total: float | None, note: str = "") -> TaskID:
+        """Begin."""
+        self.description, self.total, self.note = description, total, note
+        self.began = time.monotonic()
+        return TaskID(0)
+
+    def update(
+        self,
+        task: TaskID,
+        completed: float | None = None,
+        total: float | None = None,
+        note: str | None = None,
+        advance: float = 0.0,
+    ) -> None:
+        """Keep what is given."""
+        self.completed = self.completed if completed is None else completed
+        self.completed += advance
+        self.total = self.total if total is None else total
+        self.note = self.note if note is None else note
+
+    def advance(self, task: TaskID, advance: float = 1.0) -> None:
+        """Add to what is done."""
+        self.completed += advance
+
+    @property
+    def line(self) -> str:
+        """What is done, with the time so far and the time that is left."""
+        spent = time.monotonic() - self.began
+        parts = [f"{self.description}: {spent:.0f} s so far"]
+        if self.total and self.completed:
+            share = min(self.completed / self.total, 1.0)
+            parts += [f"{share:.0%}", f"about {spent / share - spent:.0f} s left"]
+        return ", ".join([*parts, self.note] if self.note else parts)
+
+
+@contextmanager
+def bar() -> Iterator[Progress | Lines]:
+    """Show progress on standard error: a bar, or lines where there is no terminal."""
+    if errors.is_terminal:
+        with Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.percentage:>3.0f} %"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[note]}"),
+            console=errors,
+        ) as progress:
+            yield progress
+        return
+    lines = Lines()
+    with _printed(lines):
+        yield lines
+    _print(lines)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Show that something without a measure of progress takes long."""
+    if errors.is_terminal:
+        with errors.status(what):
+            yield
+        return
+    lines = Lines(what, began=time.monotonic())
+    with _printed(lines):
+        yield
+
+
+@contextmanager
+def _printed(lines: Lines) -> Iterator[None]:
+    """Print a line every ten seconds."""
+    over = threading.Event()
+
+    def repeat() -> None:
+        while not over.wait(EVERY):
+            if lines.description:
+                _print(lines)
+
+    threading.Thread(target=repeat, daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _print(lines: Lines) -> None:
+    errors.print(lines.line, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,77 @@
+"""Notices on standard error while something is compiled, so that nobody waits blind."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+PAUSE = 2.0
+"""Time after a compilation from which the next one of its name is announced again, s"""
+EVERY = 10.0
+"""Time between two notices, s"""
+FIRST, LATER = 25, 8
+"""Usual time to compile a scenario with an empty cache, and beside another one, s"""
+
+
+@dataclass
+class _Notice:
+    """Times of what is waited for, of the monotonic clock, s."""
+
+    began: float
+    said: float
+    ended: float = float("inf")
+
+
+_compilations: dict[str, _Notice] = {}
+"""The last compilation of each name, which consists of several in a row"""
+
+
+@contextmanager
+def announced_compilation(name: str, first: bool) -> Iterator[None]:
+    """Announce a compilation, and every ten seconds that it continues.
+
+    Args:
+        name: Subject of the notices.
+        first: Whether nothing has been compiled on this machine yet.
+    """
+    notice, now = _compilations.get(name), time.monotonic()
+    if notice is None or now - notice.ended > PAUSE:
+        notice = _compilations[name] = _Notice(now, now)
+        about = FIRST if first else LATER
+        _print(f"compiling {name} once, about {about} s")
+    with _repeated(f"still compiling {name}", notice):
+        yield
+    notice.ended = time.monotonic()
+
+
+@contextmanager
+def announced_wait(name: str) -> Iterator[None]:
+    """Say every ten seconds that another process compiles what this one needs."""
+    now = time.monotonic()
+    with _repeated(f"another process compiles {name}", _Notice(now, now)):
+        yield
+
+
+@contextmanager
+def _repeated(text: str, notice: _Notice) -> Iterator[None]:
+    """Print a text every ten seconds, with the time so far."""
+    over = threading.Event()
+
+    def repeat() -> None:
+        while not over.wait(max(notice.said + EVERY - time.monotonic(), 0.0)):
+            notice.said = time.monotonic()
+            _print(f"{text}, {notice.said - notice.began:.0f} s so far")
+
+    threading.Thread(target=repeat, daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _print(text: str) -> None:
+    print(f"marl_airhockey: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,103 @@
+"""Figures in README and docs are those of the files in docs/data."""
+
+import csv
+from pathlib import Path
+from statistics import mean
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / "docs/data"
+COLUMNS = {
+    "success": ("success", mean),
+    "worst seed": ("success", min),
+    "first shot": ("first_shot", mean),
+    "sampled": ("sampled", mean),
+    "on pymunk": ("pymunk", mean),
+    "with the arm": ("arm", mean),
+    "delayed": ("delayed", mean),
+}
+"""Columns of the tables of tasks: a column of tasks.csv, and what is made of it."""
+
+
+def rows_of(name):
+    with (DATA / name).open() as file:
+        return list(csv.DictReader(file))
+
+
+def tables(page):
+    """The tables of a page: header and rows of cells."""
+    found, last = [], False
+    for line in (ROOT / page).read_text().splitlines():
+        cells = [cell.strip() for cell in line.strip()[1:-1].split("|")]
+        is_row = line.startswith("|")
+        if is_row and not last:
+            found.append((cells, []))
+        elif is_row and not set(line) <= set("| -"):
+            found[-1][1].append(cells)
+        last = is_row
+    return found
+
+
+def table(page, *titles, number=0):
+    """The n-th table of a page whose header has these titles, as dicts."""
+    fitting = [(h, r) for h, r in tables(page) if set(titles) <= set(h)]
+    header, rows = fitting[number]
+    return [dict(zip(header, row, strict=True)) for row in rows]
+
+
+def seeds(task, profile, column):
+    found = [
+        float(row[column])
+        for row in rows_of("tasks.csv")
+        if (row["task"], row["profile"], row["variant"]) == (task, profile, "")
+    ]
+    assert len(found) == 5
+    return found
+
+
+@pytest.mark.parametrize(
+    ("page", "profile", "number"),
+    [
+        ("README.md", "ideal", 0),
+        ("docs/tasks.md", "ideal", 0),
+        ("docs/tasks.md", "ur5e", 1),
+    ],
+)
+def test_tables_of_tasks_are_the_means_of_their_rows(page, profile, number):
+    shown = table(page, "task", "success", "worst seed", number=number)
+    assert len(shown) == 10
+    for row in shown:
+        for title in set(row) & set(COLUMNS):
+            column, summary = COLUMNS[title]
+            expected = summary(seeds(row["task"], profile, column))
+            assert float(row[title]) == pytest.approx(expected, abs=6e-4), (row, title)
+
+
+def test_table_of_the_arm_is_the_same():
+    shown = table("docs/arm.md", "2D, ideal", "arm, ur5e")
+    assert len(shown) == 10
+    for row in shown:
+        for title in ("2D, ideal", "arm, ideal", "2D, ur5e", "arm, ur5e"):
+            where, profile = title.split(", ")
+            column = {"2D": "success", "arm": "arm"}[where]
+            expected = mean(seeds(row["task"], profile, column))
+            assert float(row[title]) == pytest.approx(expected, abs=6e-4), (row, title)
+
+
+def test_table_of_offline_learning_has_its_rows():
+    known = {(r["task"], r["algo"], r["seed"]): r for r in rows_of("offline.csv")}
+    for row in table("docs/training.md", "BC", "IQL"):
+        for algo in ("BC", "IQL"):
+            mine = known[row[""], algo.lower(), "0"]
+            assert float(row[algo]) == pytest.approx(float(mine["success"]), abs=6e-4)
+
+
+@pytest.mark.parametrize("game", ["duel", "doubles", "free_for_all"])
+def test_ladders_have_the_ratings_of_their_files(game):
+    header, rows = next(t for t in tables("docs/games.md") if t[0][0] == "level")
+    column = header.index(f"{game}: steps") + 1
+    ladder = rows_of(f"{game}_ladder.csv")
+    assert len(ladder) == len(rows)
+    for cells, known in zip(rows, ladder, strict=True):
+        assert float(cells[column]) == pytest.approx(float(known["elo"]), abs=0.6)
