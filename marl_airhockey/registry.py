@@ -17,8 +17,8 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
 from marl_airhockey.toolkit.players import driver_of
+from marl_airhockey.toolkit.policies import ZOO
 
-ZOO = Path(__file__).parent / "zoo"
 DEFAULT_BACKEND = "numba"
 """Name of the backend that is used unless another is asked for."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Annotated
 
 import typer
@@ -36,6 +36,7 @@ from marl_airhockey.cli.real_table import (
     real_table,
 )
 from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
+from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 from marl_airhockey.toolkit.policies import Policy
 
@@ -45,7 +46,13 @@ FLOORS = ("still", "random", "sticky")
 
 @app.command("evaluate")
 def evaluate_driver(
-    driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
+    driver: Annotated[
+        list[str],
+        typer.Argument(
+            help="A driver's name or a policy's path; several runs, of different "
+            "seeds, are summed up with an interval over them."
+        ),
+    ],
     scenario: Scenario = None,
     backend: Backend = DEFAULT_BACKEND,
     profile: Profile = None,
@@ -75,17 +82,17 @@ def evaluate_driver(
     )
     if episodes < 1:
         raise ValueError(f"--episodes: {episodes} must be at least 1")
-    driver = name_on_table(driver, backend)
+    names = [name_on_table(name, backend) for name in driver]
     scenario, keywords, players = as_trained_unless_given(
-        {driver: make_agent(driver)}, scenario, keywords, as_json
+        {name: make_agent(name) for name in names}, scenario, keywords, as_json
     )
-    entries, seated = list(players.items()), players[driver]
+    entries, first = list(players.items()), players[names[0]]
     simulated = backend != REAL
-    if isinstance(seated, Policy) and simulated:
-        sampled = replace(seated, deterministic=False)
-        entries.append((f"{driver} (sampled)", sampled))
+    if isinstance(first, Policy) and simulated and len(entries) == 1:
+        sampled = replace(first, deterministic=False)
+        entries.append((f"{names[0]} (sampled)", sampled))
     if floors and simulated:
-        entries += [(f, make_agent(f)) for f in FLOORS if f != driver]
+        entries += [(f, make_agent(f)) for f in FLOORS if f not in names]
     results: list[EvaluationResult] = []
     with real_table(keywords, lab, rig) as keywords, bar() as progress:
         task = progress.add_task(scenario, total=len(entries), note="")
@@ -93,14 +100,19 @@ def evaluate_driver(
             progress.update(task, note=name)
             results.append(evaluate(entry, name, scenario, episodes, seed, keywords))
             progress.advance(task)
+    runs = OverRuns.of(results[: len(players)]) if len(players) > 1 else None
     if as_json:
         main_result = results[0].to_json()
         for result in results[1:]:
             key = "sampled" if "(sampled)" in result.driver else result.driver
             main_result.setdefault("beside", {})[key] = result.to_json()
+        if runs is not None:
+            main_result["over_runs"] = asdict(runs)
         console.print_json(json.dumps(main_result))
         return
     console.print(result_table(results))
+    if runs is not None:
+        console.print(runs.text)
 
 
 def result_table(results: list[EvaluationResult]) -> Table:

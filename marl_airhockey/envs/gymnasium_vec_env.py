@@ -53,8 +53,9 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         render_mode: str | None = None,
         **keywords: Unpack[Keywords],
     ) -> None:
-        self._mode = _mode_of(autoreset_mode)
-        same = self._mode is AutoresetMode.SAME_STEP
+        self.autoreset_mode = _mode_of(autoreset_mode)
+        """When a world that ended begins again"""
+        same = self.autoreset_mode is AutoresetMode.SAME_STEP
         self.world = build_world(scenario, num_envs, autoreset=same, keywords=keywords)
         check_one_open(self.world)
         self._pictures = Pictures(self.world, render_mode)
@@ -63,7 +64,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
             **AirHockeyEnv.metadata,
             **type(self).metadata,
             "render_fps": fps,
-            "autoreset_mode": self._mode,
+            "autoreset_mode": self.autoreset_mode,
         }
         self.num_envs = num_envs
         self.render_mode = render_mode
@@ -141,7 +142,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
             RuntimeError: with "Disabled", an episode has ended and was not reset.
             ValueError: a wrong shape, or an element that is not finite.
         """
-        if self._ended.any() and self._mode is AutoresetMode.DISABLED:
+        if self._ended.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise RuntimeError(
                 "step: episodes have ended; call "
                 'reset(options={"reset_mask": terminated | truncated}) first'
@@ -162,7 +163,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
             infos["final_info"] = final
             begun = np.flatnonzero(ended)
         self._pictures.follow(begun)
-        if self._mode is not AutoresetMode.SAME_STEP:
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
             self._ended[:] = ended
         return (
             _rows(result.observation),

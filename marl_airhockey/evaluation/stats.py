@@ -115,7 +115,9 @@ def unbeaten_mixture(score: Array, temperature: float = 0.003) -> Array:
     for _ in range(4000):
         ahead = keep * weight + step * edge @ _shares(weight)
         weight = keep * weight + step * edge @ _shares(ahead)
-    return _shares(weight)
+    share = _shares(weight)
+    share[share < 1e-6] = 0.0
+    return np.asarray(share / share.sum())
 
 
 def _shares(weight: Array) -> Array:

@@ -196,6 +196,10 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
     return _loaded[digest]
 
 
+FEW_FUNCTIONS = 40
+"""Number of functions in the cache below which most of a scenario is not there yet"""
+
+
 def _compile_first(
     source: str, path: Path, name: str, names: Mapping[str, Any] | None
 ) -> None:
@@ -204,7 +208,7 @@ def _compile_first(
     if path.exists():
         _loaded[digest] = _compile(source, path, names)
         return
-    first = not any(path.parent.glob("*.nbi"))
+    first = len(list(path.parent.glob("*.nbi"))) < FEW_FUNCTIONS
     with announced_compilation(name, first):
         _loaded[digest] = _compile(source, path, names)
     # The source comes last: where it is, its compiled code is, too.

@@ -10,7 +10,6 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.registry import (
-    ZOO,
     make_agent,
     make_scenario,
     plain_agent_names,
@@ -18,6 +17,7 @@ from marl_airhockey.registry import (
 )
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.pointing import ARM_LAG
+from marl_airhockey.toolkit.policies import ZOO
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import refuse_erratic
 from marl_airhockey.world.driven_seat import DrivenSeat

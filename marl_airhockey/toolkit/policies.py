@@ -20,6 +20,8 @@ from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.types import Array
 
+ZOO = Path(__file__).parents[1] / "zoo"
+"""Folder of the trained policies that come with the library"""
 Predict = Callable[[Any, bool], Array]
 RUN_FORMAT = 2
 """Format of a run's folder, in its ``config.toml`` and in the card of its zips.
@@ -34,6 +36,11 @@ KINDS = ("npz", "zip")
 @dataclass
 class Policy(Driver):
     """Learned policy as a driver.
+
+    Outside of environments, ``predict`` is the policy itself: it takes observations
+    (B, D) as the environment of its training gives them, and whether to return the mean
+    action, and returns actions (B, 2), fractions of top speed in the ego frame. They
+    may lie a little beyond -1 .. 1, where environments clip them.
 
     Args:
         predict: function (observation (B, ...), deterministic) -> action (B, 2).
@@ -106,7 +113,7 @@ def trained_in(card: Mapping[str, Any]) -> dict[str, Any]:
 def load_policy(
     path: str | Path, deterministic: bool = True, trust: bool | None = None
 ) -> Policy:
-    """Load a policy: a run folder of `train`, an SB3 .zip, an .onnx or an .npz.
+    """Load a policy: a run of `train`, an SB3 .zip, an .onnx, an .npz, or ``zoo/NAME``.
 
     An SB3 zip of our training is read as plain weights. Any other holds pickled Python,
     which runs when it is loaded.
@@ -123,6 +130,8 @@ def load_policy(
         RuntimeError: a missing extra; the message holds the command that installs it.
     """
     path = Path(path)
+    if path.parent == Path("zoo") and not path.exists():
+        path = ZOO / f"{path.name}.npz"
     if path.is_dir():
         kept = policies_of(path)
         path = next((file for file in kept if file.exists()), kept[0])

@@ -226,3 +226,20 @@ def test_the_benchmark_of_engines_says_what_it_is_without_ray():
         [sys.executable, script, "--help"], capture_output=True, text=True, check=True
     )
     assert "Measure all trainers" in done.stdout
+
+
+def test_several_runs_are_summed_up(touch_run):
+    words = ("evaluate", touch_run, touch_run / "last.npz", "--episodes", "5")
+    assert "success of 2 runs: " in airhockey(*words, "--no-floors").stdout
+    data = json.loads(airhockey(*words, "--no-floors", "--json").stdout)
+    assert data["over_runs"]["runs"] == 2
+
+
+def test_a_league_with_another_seed_plays_other_games(tmp_path):
+    words = ("league", "duel", "striker", "random", "--games", "2", "--json")
+    tables = [
+        json.loads(airhockey(*words, "--seed", seed, "--out", tmp_path).stdout)
+        for seed in (1, 1, 2)
+    ]
+    assert tables[0]["goal_difference"] == tables[1]["goal_difference"]
+    assert tables[0]["goal_difference"] != tables[2]["goal_difference"]

@@ -74,7 +74,7 @@ def test_a_batch_restarts_as_its_mode_says(mode):
     envs = gymnasium.make_vec(
         "marl_airhockey/Juggle-v0", vectorization_mode="vector_entry_point", **made
     )
-    assert envs.metadata["autoreset_mode"] is mode
+    assert envs.metadata["autoreset_mode"] is envs.autoreset_mode is mode
     start, _ = envs.reset(seed=[7, 9])
     np.testing.assert_array_equal(start[1], ah.make_vec("juggle").reset(seed=9)[0][0])
     still = np.zeros((2, 2), np.float32)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import marl_airhockey as ah
+from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.evaluation.stats import (
     bootstrap,
     elo,
@@ -31,3 +33,16 @@ def test_statistics_of_runs():
     assert probability_of_improvement([1, 2], [1, 2]) == 0.5
     with pytest.raises(ValueError, match="no values"):
         iqm(np.array([]))
+
+
+def test_runs_are_summed_up_over_runs_and_over_episodes():
+    names = "zoo/touch", "zoo/touch_ur5e", "still"
+    results = [ah.evaluate(name, "touch", episodes=50) for name in names]
+    found = OverRuns.of(results)
+    success = [result.success for result in results]
+    assert (found.runs, found.success) == (3, pytest.approx(np.mean(success)))
+    # Runs differ far more than the chance of 150 episodes.
+    low, high = found.over_runs
+    assert (low, high) == pytest.approx((min(success), max(success)))
+    assert low < found.over_episodes[0] < found.over_episodes[1] < high
+    assert "success of 3 runs: " in found.text

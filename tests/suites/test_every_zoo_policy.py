@@ -9,8 +9,9 @@ import pytest
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.registry import ZOO, make_agent, zoo_names
+from marl_airhockey.registry import make_agent, zoo_names
 from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.toolkit.policies import ZOO
 
 # The lower levels of a game's ladder differ from its strongest by numbers alone.
 # Policies of other profiles and tables are measured in the same way.
@@ -50,6 +51,22 @@ def test_it_is_as_good_as_its_card(name):
         driver = ah.make_agent(name)
         score, _ = play_against(card["scenario"], driver, rivals, 40, 7, options)
         assert score[0] >= low - 0.2
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        "juggle",
+        *(
+            pytest.param(task, marks=pytest.mark.slow)
+            for task in ("reach", "reach_velocity", "touch", "puck_velocity")
+        ),
+    ],
+)
+def test_policies_of_the_tasks_of_a_real_table_are_fit_for_a_robot(task):
+    found = ah.evaluate(f"zoo/{task}_ur5e", episodes=200)
+    assert found.deployability.grade in "AB"
+    assert found.success >= 0.95
 
 
 def test_every_task_and_game_has_one():

@@ -1,0 +1,43 @@
+"""Success of several training runs, which differ by their seeds, taken together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from marl_airhockey.evaluation.evaluate import EvaluationResult
+from marl_airhockey.evaluation.stats import bootstrap, interval
+
+
+@dataclass(frozen=True)
+class OverRuns:
+    """Mean success of some runs with two intervals, which answer two questions."""
+
+    runs: int
+    """Number of runs"""
+    success: float
+    """Mean success"""
+    over_runs: tuple[float, float]
+    """95 % interval over the runs, by bootstrap: how another training may turn out"""
+    over_episodes: tuple[float, float]
+    """95 % interval over all episodes, Wilson's: how exactly these runs are measured"""
+
+    @staticmethod
+    def of(results: Sequence[EvaluationResult]) -> OverRuns:
+        """Sum up the results of some runs, of equally many episodes each."""
+        success = np.array([result.success for result in results])
+        episodes = sum(result.episodes for result in results)
+        mean = float(success.mean())
+        spread = bootstrap(success, lambda values: float(values.mean()))
+        return OverRuns(len(results), mean, spread, interval(mean, episodes))
+
+    @property
+    def text(self) -> str:
+        """One line for people."""
+        (a, b), (c, d) = self.over_runs, self.over_episodes
+        return (
+            f"success of {self.runs} runs: {self.success:.3f}, 95 % over runs "
+            f"{a:.3f} .. {b:.3f}, over episodes {c:.3f} .. {d:.3f}"
+        )
