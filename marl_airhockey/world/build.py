@@ -24,6 +24,10 @@ from marl_airhockey.registry import (
 )
 from marl_airhockey.world.world import World
 
+LONGEST_STEP = 0.2
+"""Longest control step, s, for which overlaps stay below 0.25 mm; in longer ones a
+paddle has time to come to where a puck has crossed a goal line."""
+
 
 class Keywords(TypedDict, total=False):
     """Keywords of every environment; see `build_world` for meanings."""
@@ -155,8 +159,11 @@ def compile_world(scenario: str | Scenario, keywords: Keywords) -> None:
 def _check_times(
     control_dt: float, substeps: int | None, max_cycles: int | None
 ) -> None:
-    if not 0.001 <= control_dt <= 1.0:
-        raise ValueError(f"control_dt: {control_dt} s must be in 0.001 .. 1")
+    if not 0.001 <= control_dt <= LONGEST_STEP:
+        raise ValueError(
+            f"control_dt: {control_dt} s must be in 0.001 .. {LONGEST_STEP}; in longer "
+            "steps a paddle overlaps a puck that has scored"
+        )
     whole = isinstance(substeps, int) and not isinstance(substeps, bool)
     if substeps is not None and not (whole and substeps >= 1):
         raise ValueError(

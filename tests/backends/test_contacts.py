@@ -5,6 +5,7 @@ import pytest
 from pressing import overlap, press, press_world
 
 from marl_airhockey.contracts.backend import Command
+from marl_airhockey.world.build import LONGEST_STEP
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 
@@ -44,6 +45,14 @@ def test_nothing_overlaps_in_a_corner(corners, limits, preset):
         for state in press(world, 5.0):
             assert overlap(world.scene, state).max() < 2.5e-4
             assert np.isfinite(state.position).all()
+
+
+def test_nothing_overlaps_in_the_longest_control_step():
+    options = {"corners": 4, "paddles": 2, "limits": "arcade"}
+    world = press_world(40, control_dt=LONGEST_STEP, **options)
+    cornered(world)
+    for state in press(world, 10.0):
+        assert overlap(world.scene, state).max() < 2.5e-4
 
 
 def test_pymunk_leaves_no_overlap_for_two_steps():

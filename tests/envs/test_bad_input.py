@@ -66,6 +66,10 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
             lambda: ah.parallel_env("duel", options={"reaction": 0.12}),
             'no multiple of control_dt, 0.05 s; .*"reaction": 0.1} or 0.15',
         ),
+        (
+            lambda: ah.parallel_env("juggle", control_dt=0.5),
+            "control_dt: 0.5 s must be in 0.001 .. 0.2; in longer",
+        ),
         (lambda: ah.league("rally", ["still", "random"]), "airhockey crossplay rally"),
         (lambda: ah.parallel_env("juggle").reset(seed="abc"), "seed: 'abc' is no"),
         (lambda: ah.gym_env("juggle").reset(seed="abc"), "seed: 'abc' is no whole"),
