@@ -74,6 +74,8 @@ def league(
     Raises:
         ValueError: a single player, or a scenario without sides that play each other.
     """
+    if isinstance(players, str):
+        raise ValueError(f"players: a list of names is expected, got {players!r}")
     named = players if isinstance(players, Mapping) else {n: n for n in players}
     drivers = {name: make_agent(player) for name, player in named.items()}
     _, keywords = as_trained(drivers, scenario, keywords)

@@ -22,6 +22,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.evaluation.crossplay import CrossPlay, play_together
+from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 
@@ -34,6 +35,7 @@ def crossplay(
     profile: Profile = None,
     option: Options = None,
     driver: Drivers = None,
+    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
@@ -44,7 +46,7 @@ def crossplay(
     with bar() as progress:
         task = progress.add_task("pairs", total=len(mates) ** 2, note="")
         found = play_together(
-            *(scenario, mates, episodes),
+            *(scenario, mates, episodes, seed),
             keywords=keywords,
             report=lambda pairs: progress.update(task, completed=pairs),
         )

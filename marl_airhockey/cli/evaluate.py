@@ -88,7 +88,8 @@ def evaluate_driver(
     )
     entries, first = list(players.items()), players[names[0]]
     simulated = backend != REAL
-    if isinstance(first, Policy) and simulated and len(entries) == 1:
+    alone = isinstance(first, Policy) and first.can_sample and len(entries) == 1
+    if isinstance(first, Policy) and alone and simulated:
         sampled = replace(first, deterministic=False)
         entries.append((f"{names[0]} (sampled)", sampled))
     if floors and simulated:

@@ -146,7 +146,18 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
         f"and {row['cpu_seconds'] / 60:.2f} CPU-minutes ({parts})",
         soft_wrap=True,
     )
-    console.print(f"next: airhockey evaluate {folder}", soft_wrap=True)
+    console.print(f"next: airhockey {_next(folder)}", soft_wrap=True)
+
+
+def _next(folder: Path) -> str:
+    """Return the command that measures a run: a league for a game of several teams."""
+    from marl_airhockey.learn.algorithms import load_any_config
+    from marl_airhockey.learn.config import TrainConfig
+
+    config = load_any_config(folder)
+    if isinstance(config, TrainConfig) and config.self_play:
+        return f"league {config.scenario} {folder} allround striker goalkeeper random"
+    return f"evaluate {folder}"
 
 
 def _is_finished(folder: Path) -> bool:
@@ -174,7 +185,12 @@ def export(
     from marl_airhockey.learn.export import export_policy
 
     console.print_json(json.dumps(dict(export_policy(run, out, checkpoint).card)))
-    console.print(f"{out}: {out.stat().st_size / 1000:.0f} kB")
+    which = checkpoint or f"the last policy of {run}"
+    console.print(
+        f"{out}: {which}, {out.stat().st_size / 1000:.0f} kB; airhockey evaluate {run} "
+        f"plays the best one, which --checkpoint {run / 'best.npz'} exports",
+        soft_wrap=True,
+    )
 
 
 @app.command()

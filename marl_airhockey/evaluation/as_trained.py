@@ -30,8 +30,8 @@ def as_trained(
     Args:
         players: Drivers by name; those that are no policies say nothing.
         scenario: Scenario that is given, or None.
-        keywords: Keywords that are given; they are never changed. Options and drivers
-            are merged by name.
+        keywords: Keywords that are given; they are never changed. Options, drivers
+            and physics are merged by name.
 
     Returns:
         The scenario and the keywords to play with. With a single player, the drivers
@@ -63,8 +63,8 @@ def as_trained(
         del found["goals"]
     merged = {name: value for name, value in found.items() if value}
     merged |= given
-    for name in ("options", "drivers"):
-        if found.get(name) and name in given:
+    for name in ("options", "drivers", "physics"):
+        if found.get(name) and isinstance(given.get(name), Mapping):
             merged[name] = {**cast(Any, found[name]), **given[name]}
     return scenario, cast(Keywords, merged)
 
@@ -93,6 +93,9 @@ def describe_environment(
         value = keywords.get(name)
         if isinstance(value, Mapping) and value:
             parts.append(f"{name} " + " ".join(f"{k}={v}" for k, v in value.items()))
+    sources = [p.source for p in players.values() if isinstance(p, Policy)]
+    if len(players) == 1 and sources and sources[0] not in players:
+        parts.append(f"policy {sources[0]}")
     return f"{named}: {', '.join(parts)}"
 
 
@@ -132,6 +135,12 @@ def _resolved(text: str) -> str:
 
 def _require_trust(text: str, players: Mapping[str, Driver]) -> None:
     """Refuse code that a policy's file names, unless the user has trained with it."""
-    if runs_code(text) and not is_trusted_code(text):
-        source = next(iter(players))
-        require_trust(Path(source), code=f"the name of Python code, {text}")
+    if not runs_code(text) or is_trusted_code(text):
+        return
+    file, source = Path(text.partition(":")[0]), next(iter(players))
+    if file.suffix == ".py" and not file.exists():
+        raise ValueError(
+            f"{source}: it was trained in {text}, and there is no such file"
+        )
+    unknown = f"the name of Python code that you have not trained with as it is, {text}"
+    require_trust(Path(source), code=unknown)

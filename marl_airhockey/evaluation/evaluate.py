@@ -12,7 +12,7 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.evaluation.deployability import Deployability
-from marl_airhockey.evaluation.stats import bootstrap, interval, iqm
+from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world, scenario_of
@@ -55,10 +55,16 @@ class EvaluationResult:
     """Time between two actions, s"""
     options: dict[str, Any] = field(default_factory=dict)
     """Options of the scenario that were given or trained with"""
+    physics: Any = None
+    """Physics that were given or trained with; None for the scenario's own"""
+    drivers: dict[str, str] = field(default_factory=dict)
+    """Drivers of other seats, by agent"""
+    seed: int = TEST_SEED
+    """Seed of the first episode"""
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a JSON object, `returns` under the key "return"."""
-        data = asdict(self)
+        data: dict[str, Any] = without_nan(asdict(self))
         data["return"] = data.pop("returns")
         return data
 
@@ -79,6 +85,8 @@ def build_driven_world(
     Raises:
         ValueError: a seat without a driver, named.
     """
+    if "paddle_0" in keywords.get("drivers", {}):
+        raise ValueError("drivers: paddle_0 is the seat of the driver that is measured")
     scene = scenario_of(scenario, keywords).scene
     team = [i for i, s in enumerate(scene.seats) if s.team == scene.seats[0].team]
     mates = {f"paddle_{i}": driver for i in team}
@@ -151,6 +159,9 @@ def evaluate(
         observe=driver.observe or world.observer.observe,
         control_dt=world.control_dt,
         options=dict(keywords.get("options", {})),
+        physics=keywords.get("physics"),
+        drivers={k: str(v) for k, v in keywords.get("drivers", {}).items()},
+        seed=seed,
     )
 
 

@@ -10,7 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.evaluation.stats import interval, unbeaten_mixture
+from marl_airhockey.evaluation.stats import (
+    interval,
+    unbeaten_mixture,
+    without_nan,
+)
 from marl_airhockey.types import Array
 
 
@@ -110,7 +114,7 @@ class Standings:
     def to_json(self) -> dict[str, Any]:
         """Return table, scores and circles as a JSON object, the best player first."""
         order = self.order
-        return {
+        data = {
             "scenario": self.scenario,
             "games_of_a_pair": self.games,
             "table": self.rows(),
@@ -120,6 +124,8 @@ class Standings:
             "goal_difference": self.margin[np.ix_(order, order)].tolist(),
             "circles": self.circles,
         }
+        found: dict[str, Any] = without_nan(data)
+        return found
 
     def to_markdown(self) -> str:
         """Return the table and the circles as Markdown."""

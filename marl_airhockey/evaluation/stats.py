@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -124,3 +125,12 @@ def _shares(weight: Array) -> Array:
     """Return exponentials of weights (E,) as shares."""
     share = np.exp(weight - weight.max())
     return np.asarray(share / share.sum())
+
+
+def without_nan(data: Any) -> Any:
+    """Return nested dicts and lists with None for nan, which JSON does not know."""
+    if isinstance(data, Mapping):
+        return {name: without_nan(value) for name, value in data.items()}
+    if isinstance(data, (list, tuple)):
+        return [without_nan(value) for value in data]
+    return None if isinstance(data, float) and np.isnan(data) else data

@@ -72,6 +72,11 @@ class NumpyPolicy:
             return self._forward(observation)
 
     def _forward(self, observation: Array) -> Array:
+        if observation.shape[-1:] != self.centre.shape:
+            raise ValueError(
+                f"observations of shape (B, {len(self.centre)}) are expected, got "
+                f"{observation.shape}"
+            )
         x = (observation - self.centre) / self.unit
         for weight, bias in self.layers[:-1]:
             x = np.maximum(x @ weight.T + bias, 0.0)

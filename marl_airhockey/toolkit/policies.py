@@ -57,6 +57,8 @@ class Policy(Driver):
     deterministic: bool = True
     noise: Array | None = None
     """Standard deviation of sampled actions (2,), if `predict` returns only means"""
+    can_sample: bool = True
+    """False if it has a mean action alone, as ONNX models"""
     trained_in: Mapping[str, Any] = field(default_factory=dict)
     """Environment of its training, as far as it is known, see `trained_in`"""
 
@@ -191,7 +193,7 @@ def policy_driver(
         source,
         deterministic,
         np.exp(policy.log_std),
-        trained_in(policy.card),
+        trained_in=trained_in(policy.card),
     )
 
 
@@ -384,5 +386,5 @@ def _load_onnx(path: Path, deterministic: bool) -> Policy:
     known = shape if len(shape) == len(sizes) else None
     card = model.card
     policy = Policy(model, known, card.get("observe"), str(path), deterministic)
-    policy.trained_in = trained_in(card)
+    policy.trained_in, policy.can_sample = trained_in(card), False
     return policy

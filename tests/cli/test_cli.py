@@ -216,6 +216,10 @@ def test_an_exported_onnx_model_acts_as_the_run_and_knows_its_card(touch_run, tm
     expected = np.clip(run.predict(observation, True), -1.0, 1.0)
     np.testing.assert_allclose(model.predict(observation, True), expected, atol=1e-5)
     assert (model.observe, model.trained_in["scenario"]) == ("velocity", "touch")
+    with pytest.raises(ValueError, match=rf"\(B, {run.shape[0]}\) are expected"):
+        run.predict(observation[:, :3], True)
+    shown = airhockey("evaluate", path, "--episodes", "5", "--no-floors").stdout
+    assert "sampled" not in shown
     done = airhockey("export", touch_run, "--out", tmp_path / "touch.pt", ok=False)
     assert "must end in .npz or .onnx" in done.stderr
 

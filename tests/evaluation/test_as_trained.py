@@ -82,7 +82,7 @@ def test_code_that_was_not_trained_with_is_refused(gentle_run, tmp_path):
     text = file.read_text()
     try:
         file.write_text(text + "\n# changed\n")
-        with pytest.raises(ValueError, match=r"name of Python code, .*gentle.py"):
+        with pytest.raises(ValueError, match=r"not trained with as it is, .*gentle.py"):
             ah.evaluate(gentle_run, episodes=1)
         assert ah.evaluate(gentle_run, str(file), episodes=1).profile == "gantry"
     finally:
@@ -110,3 +110,24 @@ def test_a_model_on_goals_gets_the_goals_apart():
     assert ah.evaluate(Model(), "reach", episodes=2).episodes == 2
     line = describe_environment("reach", {"goals": "dict"}, {"x": make_agent("still")})
     assert line == "reach: profile ideal, control_dt 0.05 s"
+
+
+def test_physics_that_are_given_add_to_those_of_training(gentle_run):
+    result = ah.evaluate(gentle_run, episodes=1, physics={"puck_drag": 0.03}, seed=5)
+    assert result.physics == {"tilt": 4.0, "puck_drag": 0.03}
+    assert result.to_json()["seed"] == 5
+
+
+def test_a_task_that_is_gone_is_named(gentle_run):
+    file = gentle_run.parent / "gentle.py"
+    kept = file.rename(file.with_suffix(".kept"))
+    try:
+        with pytest.raises(ValueError, match=r"gentle\.py, and there is no such file"):
+            ah.evaluate(gentle_run, episodes=1)
+    finally:
+        kept.rename(file)
+
+
+def test_the_measured_seat_takes_no_other_driver():
+    with pytest.raises(ValueError, match="paddle_0 is the seat of the driver that is"):
+        ah.evaluate("striker", "touch", episodes=1, drivers={"paddle_0": "still"})

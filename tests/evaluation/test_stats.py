@@ -10,6 +10,7 @@ from marl_airhockey.evaluation.stats import (
     elo,
     iqm,
     probability_of_improvement,
+    without_nan,
 )
 
 
@@ -46,3 +47,12 @@ def test_runs_are_summed_up_over_runs_and_over_episodes():
     assert (low, high) == pytest.approx((min(success), max(success)))
     assert low < found.over_episodes[0] < found.over_episodes[1] < high
     assert "success of 3 runs: " in found.text
+
+
+def test_json_has_no_nan():
+    data = {"a": [1.0, float("nan")], "b": (2, {"c": float("nan")})}
+    assert without_nan(data) == {"a": [1.0, None], "b": [2, {"c": None}]}
+    found = ah.evaluate("still", "touch", episodes=1, control_dt=0.1).to_json()
+    assert found["deployability"]["power_above_5hz"] is None
+    table = ah.league("duel", ["still", "random"], games=2).to_json()
+    assert table["score"][0][0] is None
