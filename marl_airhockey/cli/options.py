@@ -187,7 +187,7 @@ def as_trained_unless_given(
         quiet: Whether the line goes to standard error, as the output is JSON.
 
     Returns:
-        Scenario, keywords, and the players with the observations that were asked for.
+        Scenario, keywords, and the players with the observations that were given.
     """
     found, keywords = as_trained(players, scenario, keywords)
     assert isinstance(found, str)

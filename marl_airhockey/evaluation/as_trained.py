@@ -82,7 +82,7 @@ def describe_environment(
     keywords: Keywords,
     players: Mapping[str, Driver],
 ) -> str:
-    """Return one line that names what is played and in which environment."""
+    """Return one line that names a scenario and the environment of its play."""
     forms = {p.observe for p in players.values() if isinstance(p, Policy)} - {None}
     observe = keywords.get("observe") or "/".join(sorted(map(str, forms)))
     named = scenario if isinstance(scenario, str) else find_scenario(scenario).name

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pressing import overlap, press, press_world
 
+import marl_airhockey as ah
 from marl_airhockey.contracts.backend import Command
 from marl_airhockey.world.build import LONGEST_STEP
 
@@ -47,12 +48,20 @@ def test_nothing_overlaps_in_a_corner(corners, limits, preset):
             assert np.isfinite(state.position).all()
 
 
-def test_nothing_overlaps_in_the_longest_control_step():
-    options = {"corners": 4, "paddles": 2, "limits": "arcade"}
-    world = press_world(40, control_dt=LONGEST_STEP, **options)
-    cornered(world)
-    for state in press(world, 10.0):
-        assert overlap(world.scene, state).max() < 2.5e-4
+def test_no_paddle_overlaps_a_puck_in_the_longest_control_step():
+    options = {"reaction": 0.0}
+    world = ah.make_world("duel", 128, control_dt=LONGEST_STEP, options=options)
+    world.reset(0)
+    rng, scene = np.random.default_rng(0), world.scene
+    seats, toward = len(scene.seats), np.array([1.0, -1.0])[:, None]
+    touch = scene.bodies.radius[0] + scene.bodies.radius[seats]
+    for _ in range(round(30.0 / LONGEST_STEP)):
+        state = world.state
+        ego = (state.puck - state.paddle) * toward
+        noise = rng.normal(0.0, 0.1, ego.shape)
+        world.step(np.clip(ego * rng.uniform(1.0, 20.0) + noise, -1.0, 1.0))
+        gap = np.linalg.norm(world.state.paddle - world.state.puck, axis=-1)
+        assert gap.min() > touch - 2.5e-4
 
 
 def test_pymunk_leaves_no_overlap_for_two_steps():

@@ -197,8 +197,8 @@ def test_meanings_are_those_of_the_nearest_class():
 
 def test_physics_takes_presets_values_and_ranges():
     words = ("evaluate", "still", "-s", "touch", "--no-floors", "--episodes", "2")
-    asked = ("--physics", "wooden", "--physics", "tilt=3:6", "--physics", "puck_drag=0")
-    line = airhockey(*words, *asked).stdout.splitlines()[0]
+    given = ("--physics", "wooden", "--physics", "tilt=3:6", "--physics", "puck_drag=0")
+    line = airhockey(*words, *given).stdout.splitlines()[0]
     assert "physics preset=wooden tilt=(3.0, 6.0) puck_drag=0.0" in line
 
 

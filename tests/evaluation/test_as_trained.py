@@ -1,4 +1,4 @@
-"""Policies play what they were trained in, unless something else is asked for."""
+"""Policies play what they were trained in, unless something else is given."""
 
 import json
 
@@ -34,10 +34,10 @@ def gentle_run(tmp_path_factory):
 
 
 def test_zoo_policy_plays_in_the_profile_of_its_training():
-    asked = {"juggle_ur5e": make_agent("zoo/juggle_ur5e")}
-    scenario, keywords = as_trained(asked, None, {})
+    players = {"juggle_ur5e": make_agent("zoo/juggle_ur5e")}
+    scenario, keywords = as_trained(players, None, {})
     assert (scenario, keywords["profile"]) == ("juggle", "ur5e")
-    assert as_trained(asked, None, {"profile": "ideal"})[1]["profile"] == "ideal"
+    assert as_trained(players, None, {"profile": "ideal"})[1]["profile"] == "ideal"
     assert ah.evaluate("zoo/juggle_ur5e", episodes=1).profile == "ur5e"
     assert ah.evaluate("zoo/juggle_ur5e", episodes=1).observe == "estimate"
 
@@ -60,8 +60,8 @@ def test_commands_say_what_they_play(gentle_run):
     assert "profile gantry, observe estimate, control_dt 0.1 s" in first
     assert "price=0.3" in first
     assert "tilt=4.0" in first
-    asked = ("--profile", "ideal", "--json", "--no-floors", "--episodes", "2")
-    found = json.loads(airhockey("evaluate", gentle_run, *asked).stdout)
+    given = ("--profile", "ideal", "--json", "--no-floors", "--episodes", "2")
+    found = json.loads(airhockey("evaluate", gentle_run, *given).stdout)
     assert found["profile"] == "ideal"
 
 
