@@ -2,8 +2,8 @@
 
     make check
 
-The tests of ``marl_airhockey/world/sensor.py`` are ``tests/world/test_sensor.py``, or
-all of ``tests/world`` if there is no such file. A scenario or driver gets its part of
+The tests of ``marl_airhockey/sensing/delay.py`` are ``tests/sensing/test_delay.py``, or
+all of ``tests/sensing`` if there is no such file. A scenario or driver gets its part of
 ``tests/suites``. This is for use while editing; ``make test`` is the whole short run.
 """
 

@@ -61,17 +61,17 @@ FAULTS = [
     ),
     Fault(
         "delay line off by one",
-        "marl_airhockey/world/delay.py",
+        "marl_airhockey/sensing/delay.py",
         "np.maximum(last - whole - 1, 0)",
         "np.maximum(last - whole - 2, 0)",
-        "world/test_delay.py world/test_sensor.py",
+        "sensing/test_delay.py sensing/test_sensor.py",
     ),
     Fault(
         "stale sensor frame",
-        "marl_airhockey/world/sensor.py",
+        "marl_airhockey/sensing/simulated_camera.py",
         'age = values["observation_delay"][rows]\n',
         'age = values["observation_delay"][rows] + self.control_dt\n',
-        "world/test_sensor.py",
+        "sensing/test_sensor.py",
     ),
     Fault(
         "seed without i",
@@ -83,8 +83,8 @@ FAULTS = [
     Fault(
         "swapped seat",
         "marl_airhockey/world/driven_seat.py",
-        "seats, want = np.array([self.index]), self.driver.observe",
-        "seats, want = np.array([0]), self.driver.observe",
+        "seats, form = np.array([self.index]), self.driver.observe",
+        "seats, form = np.array([0]), self.driver.observe",
         "world/test_roster.py",
     ),
     Fault(

@@ -38,14 +38,13 @@ from marl_airhockey.evaluation.comparison import (
 from marl_airhockey.evaluation.evaluate import (
     TEST_SEED,
     EpisodeStatistics,
-    build_driven_world,
 )
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.world import LabWorld
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.toolkit.policies import load_policy
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.build import Keywords, build_driven_world
 
 OPTIONS = {"table": LabSetup().table}
 EPISODES = 1000

@@ -13,7 +13,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
 LEAVES = [PACKAGE.parent / folder for folder in ("scenarios", "agents")]
 SOURCES = [path for folder in (PACKAGE, *LEAVES) for path in folder.rglob("*.py")]
-LOWER_ROOMS = ("types", "jit", "core", "contracts", "toolkit")
+LOWER_ROOMS = ("types", "jit", "core", "contracts", "sensing", "toolkit")
 EXTRAS = [
     "torch",
     "stable_baselines3",

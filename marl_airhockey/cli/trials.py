@@ -123,16 +123,17 @@ def _play(
     out: Path,
 ) -> TrialSheet:
     """Play the trials of a plan from starts that are spread; return the sheet."""
-    from marl_airhockey.evaluation.evaluate import build_driven_world
     from marl_airhockey.evaluation.trial_sheet import TrialSheet
     from marl_airhockey.evaluation.trials import (
         play_trials,
         spread_starts,
         write_starts,
     )
+    from marl_airhockey.world.build import build_driven_world
 
-    first = next(iter(drivers.values()))[0]
-    world = build_driven_world(first, game, 1, keywords)
+    every = [driver for policies in drivers.values() for driver in policies]
+    forms = [driver.observe for driver in every if driver.observe]
+    world = build_driven_world(every[0], game, 1, keywords, forms)
     try:
         chosen = spread_starts(world, starts)
         sheet = TrialSheet(out, plan(chosen))

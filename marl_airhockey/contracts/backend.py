@@ -69,17 +69,17 @@ class Backend(ABC):
         ValueError: substeps for a backend that finds contacts at their moments.
     """
 
-    exact: ClassVar[bool]
-    """True if row i does not depend on the number of worlds, to the bit."""
-    ideal: ClassVar[bool] = True
-    """True if paddles move exactly as commanded and contacts take no time. Where they
-    do not, no servo is simulated besides."""
-    realtime: ClassVar[bool] = False
-    """True for a real table: a step takes as long as it lasts, episodes begin as
-    somebody arranges them, and a camera sees what no simulated sensor has to spoil."""
-    late: ClassVar[bool] = False
-    """True if paddles follow their commands late, so that limits go on from the last
-    command instead of from how paddles move."""
+    instant_contacts: ClassVar[bool] = True
+    """True if a contact takes no time: an impulse, so bounces have closed forms."""
+    tracks_commands: ClassVar[bool] = True
+    """True if paddles move exactly as commanded until something stops them. Where they
+    do not, an arm moves them: it has parameters of its own, and no servo is simulated
+    in addition."""
+    senses_itself: ClassVar[bool] = False
+    """True for a real table: its states are measured, so that no sensor, latency, noise
+    or servo is simulated; a step takes as long as it lasts; an episode begins with what
+    `arrange` brings about; limits continue from the last command, as measured
+    velocities come late."""
     timestep: ClassVar[float | None]
     """Longest physics step unless ``substeps`` is given, s; None without such steps."""
     cameras: ClassVar[tuple[str, ...]] = ()
@@ -162,8 +162,7 @@ class Backend(ABC):
     def arrange(self, state: State) -> State:
         """Bring about the state in which an episode is to begin; return that it is.
 
-        Called after `reset` where `realtime` is true; a simulated table is at once as
-        it is wanted.
+        Called after `reset` where `senses_itself` is true.
 
         Raises:
             RuntimeError: it cannot be brought about, with the reason.
@@ -178,7 +177,7 @@ class Backend(ABC):
     def sight(self) -> Array:
         """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest picture.
 
-        Called where `realtime` is true.
+        Called where `senses_itself` is true.
         """
         raise NotImplementedError
 

@@ -116,15 +116,15 @@ class EgoView:
         state: State,
         memory: Memory,
         history: Array,
-        asked: Array,
+        requested: Array,
         paddle: tuple[Array, Array],
         scope: ObservationContext,
     ) -> None:
         self.state, self.memory, self.scope = state, memory, scope
         self.history = history
         """(..., HISTORY, pucks, 4) sensed x, y, visible, age (s), newest last"""
-        self.asked = asked
-        """(..., PENDING, S, 2) actions asked for, ego frames, newest last"""
+        self.requested = requested
+        """(..., PENDING, S, 2) requested actions, ego frames, newest last"""
         self.own, self.own_velocity = (self._own(x) for x in paddle)
         """(..., S, 2) each seat's own paddle now, m and m/s"""
         self.puck = self.rotate(state.puck)
@@ -191,3 +191,41 @@ class Observable(ABC):
     @abstractmethod
     def write(self, ego: EgoView, out: Array) -> None:
         """Put the numbers into ``out`` (..., S, columns)."""
+
+
+class ObservationLayout:
+    """Observables side by side: bounds, labels, and the numbers of an ego view."""
+
+    def __init__(
+        self, observables: tuple[Observable, ...], scope: ObservationContext
+    ) -> None:
+        self.scope = scope
+        columns = [observable.columns(scope) for observable in observables]
+        ends = np.cumsum([len(c) for c in columns]).tolist()
+        starts = [0, *ends[:-1]]
+        self._parts = [
+            (observable, slice(a, b))
+            for observable, a, b in zip(observables, starts, ends, strict=True)
+        ]
+        flat = [column for part in columns for column in part]
+        self.meanings = tuple(
+            (type(observable).__doc__ or "").partition("\n\n")[0]
+            for observable, part in zip(observables, columns, strict=True)
+            for _ in part
+        )
+        """What each column is of: the first sentence of its observable's docstring"""
+        self.labels = tuple(column.label for column in flat)
+        self.low = np.array([c.low for c in flat], np.float32)
+        self.high = np.array([c.high for c in flat], np.float32)
+        self.unit = np.array([c.unit for c in flat], np.float32)
+        self.centre = np.array([c.centre for c in flat], np.float32)
+
+    def read(self, ego: EgoView) -> Array:
+        """(..., S, columns) float32, inside the bounds."""
+        seats = len(self.scope.scene.seats)
+        shape = (*ego.state.time.shape, seats, len(self.labels))
+        out = np.empty_like(ego.state.position, shape=shape)
+        for observable, part in self._parts:
+            observable.write(ego, out[..., part])
+        inside = np.minimum(np.maximum(out, self.low), self.high)
+        return inside.astype(np.float32)

@@ -85,7 +85,7 @@ def step_columns(world: World) -> Columns:
     outcome, episode = world.outcome, world.episode
     return {
         **first_columns(world),
-        "action": world.asked,
+        "action": world.requested,
         "delayed_action": world.action,
         "command": world.command,
         **outcome,

@@ -20,9 +20,8 @@ from marl_airhockey.data.columns import (
 )
 from marl_airhockey.devices.camera import Film
 from marl_airhockey.devices.camera.film import SUFFIX as FILM_SUFFIX
-from marl_airhockey.evaluation.evaluate import build_driven_world
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.build import Keywords, build_driven_world
 from marl_airhockey.world.world import World
 
 AT_ONCE = 250
@@ -63,7 +62,7 @@ def record_episodes(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"{folder}: {error.strerror}") from error
-    live = find_backend(keywords.get("backend", DEFAULT_BACKEND)).realtime
+    live = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
     at_once = 1 if live else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
     now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S-%f")

@@ -180,7 +180,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         result.observation = self.world.observation()
 
     def _infos(self, result: StepResult | None = None) -> dict[str, Any]:
-        result = result or self.world.no_step()
+        result = result or self.world.empty_result()
         retired = self.world.retired
         if retired is None:
             alive = np.ones(self.num_envs, np.bool_)

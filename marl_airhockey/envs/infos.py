@@ -52,7 +52,7 @@ def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, 
     }
     for name, term in result.terms.items():
         info[_term(name)] = term.item(i)
-    if world.backend.realtime:
+    if world.backend.senses_itself:
         info["interruption"] = result.interruption
     return info
 

@@ -151,7 +151,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             self.np_random = np.random.default_rng(seed)
         self.agents = self.possible_agents[:]
         self._begin_pictures()
-        return self._dict(observation), self._infos(self.world.no_step())
+        return self._dict(observation), self._infos(self.world.empty_result())
 
     @property
     def physics(self) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any, Unpack
 
 import numpy as np
@@ -30,7 +30,8 @@ class AirHockeyVecEnv(VecEnv):
         scenario: its name, or a scenario object.
         num_worlds: B.
         render_mode: None or "rgb_array": pictures of all worlds, tiled.
-        **keywords: see `make.build_world`.
+        forms: see `build.build_world`.
+        **keywords: see `build.build_world`.
     """
 
     def __init__(
@@ -38,9 +39,10 @@ class AirHockeyVecEnv(VecEnv):
         scenario: str | Scenario,
         num_worlds: int = 1,
         render_mode: str | None = None,
+        forms: Collection[str] = (),
         **keywords: Unpack[Keywords],
     ) -> None:
-        self.world = build_world(scenario, num_worlds, True, keywords)
+        self.world = build_world(scenario, num_worlds, True, keywords, forms)
         check_some_open(self.world)
         self.seats = len(self.world.open)
         self.render_mode = render_mode

@@ -22,7 +22,7 @@ def observation_space(observer: Observer, observe: str | None = None) -> Any:
     observe = observe or observer.observe
     if observe == "pixels":
         return spaces.Box(0, 255, (PIXELS, PIXELS, FRAMES), np.uint8)
-    layout = observer.prepare(observe)
+    layout = observer.layout_of(observe)
     flat = spaces.Box(layout.low, layout.high, dtype=np.float32)
     scenario = observer.scenario
     if scenario.goals == "flat" or not isinstance(scenario, GoalScenario):

@@ -15,7 +15,7 @@ from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_world, scenario_of
+from marl_airhockey.world.build import Keywords, build_driven_world
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000
@@ -69,38 +69,6 @@ class EvaluationResult:
         return data
 
 
-def build_driven_world(
-    driver: Driver, scenario: str | Scenario, num_worlds: int, keywords: Keywords
-) -> World:
-    """Build worlds in which a driver has ``paddle_0`` and its mates' seats.
-
-    All other seats need drivers, too. Episodes do not restart by themselves.
-
-    Args:
-        driver: driver of the team of ``paddle_0``.
-        scenario: name of the scenario, or a scenario object.
-        num_worlds: number of worlds.
-        keywords: keywords of the environment; its drivers come first for mates' seats.
-
-    Raises:
-        ValueError: a seat without a driver, named.
-    """
-    if "paddle_0" in keywords.get("drivers", {}):
-        raise ValueError("drivers: paddle_0 is the seat of the driver that is measured")
-    scene = scenario_of(scenario, keywords).scene
-    team = [i for i, s in enumerate(scene.seats) if s.team == scene.seats[0].team]
-    mates = {f"paddle_{i}": driver for i in team}
-    drivers = {**mates, **keywords.get("drivers", {}), "paddle_0": driver}
-    seated: Keywords = {**keywords, "drivers": drivers}
-    world = build_world(scenario, num_worlds, autoreset=False, keywords=seated)
-    if len(world.open):
-        raise ValueError(
-            f"{world.scenario.name!r} has more seats: say who drives paddle_"
-            f"{world.open[0]}, e.g. --driver paddle_{world.open[0]}=goalkeeper"
-        )
-    return world
-
-
 def evaluate(
     driver: Driver,
     name: str,
@@ -130,7 +98,7 @@ def evaluate(
         raise ValueError(f"episodes: {episodes} must be at least 1")
     name_of_backend = keywords.get("backend", DEFAULT_BACKEND)
     # On a real table episodes follow each other; elsewhere all are played at once.
-    at_once = 1 if find_backend(name_of_backend).realtime else episodes
+    at_once = 1 if find_backend(name_of_backend).senses_itself else episodes
     world = build_driven_world(driver, scenario, at_once, keywords)
     statistics = EpisodeStatistics(episodes)
     try:

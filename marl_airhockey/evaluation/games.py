@@ -113,7 +113,8 @@ def play_games(
         ValueError: a scenario without teams that play each other.
     """
     games = len(lineups)
-    world = build_world(scenario, games, autoreset=False, keywords=keywords or {})
+    forms = [player.observe for player in players if player.observe]
+    world = build_world(scenario, games, False, keywords or {}, forms)
     teams = teams_of([seat.team for seat in world.scene.seats])
     if teams.max() == 0:
         together = len(teams) > 1

@@ -9,11 +9,10 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.evaluation.evaluate import build_driven_world
 from marl_airhockey.render.renderer import TOP, Renderer
 from marl_airhockey.render.video import write_video
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.build import Keywords, build_driven_world
 
 FINAL_HOLD = 0.7
 """Time, s, for which a video rests on the last picture of an episode"""

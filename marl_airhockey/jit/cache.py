@@ -37,7 +37,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 VARIABLE = "MARL_AIRHOCKEY_CACHE"
 """Environment variable that names the folder of all that the library caches"""
-PACKAGES = ("backends", "contracts", "core", "devices", "jit", "toolkit")
+PACKAGES = ("backends", "contracts", "core", "devices", "jit", "sensing", "toolkit")
 """Packages whose functions compiled code can call; their sources name the folder"""
 UNUSED = 30 * 24 * 3600.0
 """Time after which the folder of other sources is deleted, s"""

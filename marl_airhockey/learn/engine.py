@@ -72,7 +72,7 @@ def end_setup(run: TrainingRun[TrainConfig]) -> None:
 
     Arms are slow to build and compile next to nothing, so they are left alone.
     """
-    if find_backend(run.config.backend).ideal:
+    if find_backend(run.config.backend).tracks_commands:
         compile_world(run.config.scenario, run.config.training_keywords)
     run.end_setup()
 

@@ -63,7 +63,9 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         folder: Path,
         seed: int,
     ) -> None:
-        super().__init__(scenario, num_worlds, **keywords)
+        scripted = {name: make_agent(name) for name in scripts}
+        forms = [driver.observe for driver in scripted.values() if driver.observe]
+        super().__init__(scenario, num_worlds, forms=forms, **keywords)
         scene = self.world.scene
         self._teams = teams_of([seat.team for seat in scene.seats])
         members = [np.flatnonzero(self._teams == t) for t in np.unique(self._teams)]
@@ -74,8 +76,8 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         self._rng = np.random.default_rng(seed)
         self._slowest, self._pace = pace, np.ones(num_worlds)
         self._roster = Roster(self.world)
-        for name in scripts:
-            self._roster.add(name, make_agent(name))
+        for name, driver in scripted.items():
+            self._roster.add(name, driver)
         self._scripts = len(scripts)
         self._scores = np.full(self._scripts, 0.5)
         self._snapshots: list[Path] = []

@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from marl_airhockey.contracts.observable import OBSERVE
 from marl_airhockey.core.blocks import Columns
 from marl_airhockey.core.seat import Seat
 from marl_airhockey.data.columns import first_columns
@@ -51,7 +52,9 @@ class LiveMatch:
     ) -> None:
         usual: Keywords = {"control_dt": self.CONTROL_DT}
         self.keywords: Keywords = {**usual, **keywords}
-        self.world = build_world(scenario, 1, autoreset=False, keywords=self.keywords)
+        # Policies of any form can take a seat at any time; none of the zoo sees pixels.
+        forms = [form for form in OBSERVE if form != "pixels"]
+        self.world = build_world(scenario, 1, False, self.keywords, forms)
         agents = [f"paddle_{i}" for i in range(len(self.seats))]
         for agent in drivers:
             if agent not in agents:

@@ -44,7 +44,7 @@ class MatchDrivers:
         self.names = [PERSON for _ in seats]
         """Name or path of the driver of each seat."""
         self._device_kinds = ["mouse" for _ in seats]
-        lag = ARM_LAG if world.backend.realtime else 0.0
+        lag = ARM_LAG if world.backend.senses_itself else 0.0
         self._by_kind = {"mouse": f"mouse:lag={lag}", "gamepad": "gamepad"}
         self._devices = [make_agent(self._by_kind["mouse"]) for _ in seats]
         self._driven = [self._build(i) for i in range(len(seats))]
@@ -54,7 +54,7 @@ class MatchDrivers:
         """Names of programs to choose from: fitting policies, then scripts."""
         hidden = (*INPUT_DEVICES, "reacher")
         scripts = [name for name in plain_agent_names() if name not in hidden]
-        if self._world.backend.realtime:
+        if self._world.backend.senses_itself:
             scripts = [name for name in scripts if not make_agent(name).erratic]
         if len(self.names) > 1:
             scripts += [
@@ -74,14 +74,13 @@ class MatchDrivers:
         found: list[tuple[bool, str]] = []
         for name in zoo_names():
             card = NumpyPolicy.load(ZOO / f"{name[4:]}.npz").card
-            # First what costs nothing: a form of observations that is asked for is
-            # compiled.
+            # First what costs nothing: a layout is compiled with the next episode.
             if card["scenario"] != scenario.name:
                 continue
             own = make_scenario(card["scenario"], **card["options"])
             same = own.seats == scenario.seats and own.table == scenario.table
             if same and card["labels"] == list(
-                observer.prepare(card["observe"]).labels
+                observer.layout_of(card["observe"]).labels
             ):
                 found.append((card["profile"] != self._profile, name))
         return [name for _, name in sorted(found)]
@@ -163,6 +162,6 @@ class MatchDrivers:
         driver = self._devices[i]
         if name != PERSON:
             driver = make_agent(name)
-            refuse_erratic(f"paddle_{i}", driver, world.backend.realtime)
+            refuse_erratic(f"paddle_{i}", driver, world.backend)
             driver = driver if driver.led else self.handicap.apply(driver)
         return DrivenSeat(i, driver, world.observer, 1, world.control_dt)

@@ -51,8 +51,8 @@ class OwnPaddle(Observable):
         out[..., 2:4] = ego.own_velocity
         end = 4
         if ego.scope.observe != "velocity":
-            asked, end = ego.asked.swapaxes(-2, -3), 4 + 2 * PENDING
-            out[..., 4:end] = asked.reshape(*asked.shape[:-2], -1)
+            actions, end = ego.requested.swapaxes(-2, -3), 4 + 2 * PENDING
+            out[..., 4:end] = actions.reshape(*actions.shape[:-2], -1)
         if ego.scope.reaction:
             out[..., end : end + 2], out[..., end + 2 :] = ego.own_then
 

@@ -15,9 +15,8 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.recording import SUFFIX, read_recording
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.columns import scenario_of
-from marl_airhockey.evaluation.evaluate import build_driven_world
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.build import Keywords, build_driven_world
 
 JUMP_SLACK = 0.5
 """Excess of a body's mean speed in a step over its speeds before and after it, m/s,

@@ -3,30 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.contracts.backend import Command
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
+from marl_airhockey.sensing.delay import Delay
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.control_step import ControlStep
-from marl_airhockey.world.delay import Delay
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.episode import Episode
-from marl_airhockey.world.retired_seats import RetiredSeats
+
+
+class Inputs(NamedTuple):
+    """Inputs of a control step; preallocated arrays, overwritten at every step."""
+
+    action: Array
+    """(B, seats, 2) actions after their delay: fractions of top speed, ego frames"""
+    prescribed: Array
+    """(B, seats, 4) position, m, and velocity, m/s, of position-driven paddles, table
+    frame; nan for all others"""
+    closed: Array
+    """(B, goal_lines) bool: goal lines that are wall"""
+    raised: Array
+    """(B, seats) bool: paddles that are held above the table and touch nothing"""
+
+    @staticmethod
+    def empty(scene: Scene, worlds: int) -> Inputs:
+        """Return inputs of paddles at rest, freshly allocated."""
+        still = Command.still(scene, worlds)
+        action = np.zeros((worlds, len(scene.seats), 2))
+        return Inputs(action, still.prescribed, still.closed, still.raised)
 
 
 class Actions:
     """Collector of the actions of B worlds, which delays them by the physics.
 
     Args:
-        scenario: says which seats are retired.
-        driven: seats with drivers inside.
-        open_seats: (open,) indices of the others.
-        physics: says how long a delay there can be.
-        worlds: B.
-        control_dt: s.
+        scenario: Scenario, which says which seats are retired.
+        driven: Seats with drivers inside the environment.
+        open_seats: Indices (open,) of the other seats.
+        physics: Ranges of the action latency.
+        worlds: Number of worlds, B.
+        control_dt: Time of a step, s.
     """
 
     def __init__(
@@ -41,83 +63,102 @@ class Actions:
         scene, longest = scenario.scene, physics.highest("action_delay")
         self._scenario, self._driven, self._open = scenario, driven, open_seats
         self._rotations = [scene.table.rotation(seat.side) for seat in scene.seats]
-        self._retired_seats = RetiredSeats(scene)
+        self._retirement = _Retirement(scene)
         self._shape = (worlds, len(open_seats), 2)
-        shape = (worlds, len(scene.seats), 2)
+        self.inputs = Inputs.empty(scene, worlds)
+        """Inputs of the step, as `collect` leaves them."""
+        shape = self.inputs.action.shape
         self._delay = Delay(longest, control_dt, shape) if longest else None
-        self._prescribes = False
-        """True if the last step had prescribed paddles or closed goals."""
+        self._positioned = False
+        """True if the last step had position-driven paddles or closed goals."""
 
     def reset(self, worlds: Array) -> None:
         """Forget the actions that are under way in some worlds, by index."""
         if self._delay is not None:
             self._delay.fill(worlds, 0.0)
 
-    def asked(self, step: ControlStep) -> Array:
-        """Return the actions (B, seats, 2) of the step, before their delay."""
-        return step.action if self._delay is None else self._delay.newest
-
     def collect(
         self,
-        step: ControlStep,
         actions: Array,
         prescribed: Array | None,
         sensed: State,
         memory: Memory,
         episode: Episode,
-    ) -> None:
-        """Fill the actions, prescribed motions and closed goals of a step.
+    ) -> Array:
+        """Fill `inputs`; return the requested actions (B, seats, 2), before any delay.
 
         Args:
-            step: its ``action``, ``prescribed``, ``closed`` and ``raised`` are filled.
-            actions: (B, open, 2) of the open seats.
-            prescribed: (B, open, 4) of the open seats, nan where they ask; or None.
-            sensed: state that drivers see, table frame.
-            memory: of the scenario.
-            episode: its counters and physics.
+            actions: Actions (B, open, 2) of the open seats.
+            prescribed: Positions and velocities (B, open, 4) of paddles of open seats,
+                nan for those that request an action; None if all do.
+            sensed: State that drivers observe, table frame.
+            memory: Memory of the scenario.
+            episode: Counters and physics of the running episodes.
 
         Raises:
-            ValueError: a wrong shape.
+            ValueError: A wrong shape.
         """
         if actions.shape != self._shape:
             raise ValueError(
                 f"actions: expected shape {self._shape}, got {actions.shape}"
             )
-        if self._prescribes:
-            step.prescribed[:], step.closed[:] = np.nan, False
-            step.raised[:] = False
-            self._prescribes = False
+        inputs, requested = self.inputs, self.inputs.action
+        if self._positioned:
+            inputs.prescribed[:], inputs.closed[:] = np.nan, False
+            inputs.raised[:] = self._positioned = False
         if not self._driven:
-            step.action[:] = actions
+            requested[:] = actions
         else:
-            step.action[:, self._open] = actions
+            requested[:, self._open] = actions
         if prescribed is not None:
             for k, measured in zip(self._open, prescribed.swapaxes(0, 1), strict=True):
-                self._prescribe(step, int(k), measured)
+                self._position(int(k), measured)
         for seat in self._driven:
             measured, k = seat.measured(), seat.index
             if measured is None:
                 values, cycles = episode.physics, episode.cycles
-                step.action[:, k] = seat.act(sensed, memory, values, cycles)
+                requested[:, k] = seat.act(sensed, memory, values, cycles)
             else:
-                self._prescribe(step, k, measured)
+                self._position(k, measured)
         retired = self._scenario.retired(memory)
         if retired is not None and retired.any():
-            seats, self._prescribes = self._retired_seats, True
-            seats.retire(
-                *(retired, step.action, step.prescribed, step.closed, step.raised)
-            )
-        if self._delay is not None:
-            delay = episode.physics["action_delay"]
-            step.action[:] = self._delay.push(step.action, delay)
+            self._retirement.apply(retired, inputs)
+            self._positioned = True
+        if self._delay is None:
+            return requested
+        requested = requested.copy()
+        delay = episode.physics["action_delay"]
+        inputs.action[:] = self._delay.push(requested, delay)
+        return requested
 
-    def _prescribe(self, step: ControlStep, k: int, measured: Array) -> None:
-        """Put a seat's paddle where it was measured, (B, 4), ego frame; nan: it asks.
+    def _position(self, k: int, measured: Array) -> None:
+        """Put a seat's paddle where it was measured, (B, 4), ego frame.
 
-        What a seat asks for while it prescribes is nothing.
+        Worlds whose row is nan keep the requested action; in all others it is 0.
         """
-        self._prescribes = True
+        self._positioned = True
+        action, prescribed = self.inputs.action, self.inputs.prescribed
         given = np.isfinite(measured[:, :1])
-        step.action[:, k] = np.where(given, 0.0, step.action[:, k])
-        step.prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
-        step.prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
+        action[:, k] = np.where(given, 0.0, action[:, k])
+        prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
+        prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
+
+
+class _Retirement:
+    """Positions of retired paddles, behind their sides, and the goals that they own."""
+
+    def __init__(self, scene: Scene) -> None:
+        table, sides = scene.table, [seat.side for seat in scene.seats]
+        behind = table.offsets[sides] + 2 * table.paddle_radius
+        self._parking = np.zeros((len(sides), 4))
+        self._parking[:, :2] = -table.normals[sides] * behind[:, None]
+        lines = [line.side for line in scene.goal_lines]
+        owners = [sides.index(side) if side in sides else -1 for side in lines]
+        self._owner = np.array(owners, np.int64)
+
+    def apply(self, retired: Array, inputs: Inputs) -> None:
+        """Remove the paddles of retired seats (B, seats) and close their goals."""
+        inputs.action[retired], inputs.raised[retired] = 0.0, True
+        parking = np.broadcast_to(self._parking, inputs.prescribed.shape)
+        inputs.prescribed[retired] = parking[retired]
+        inputs.closed[:] = retired[:, self._owner] & (self._owner >= 0)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypedDict
 
 import numpy as np
 
+from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import (
@@ -51,38 +52,41 @@ def build_world(
     num_worlds: int,
     autoreset: bool,
     keywords: Keywords,
+    forms: Collection[str] = (),
 ) -> World:
     """Build B worlds of a scenario from the keywords that all environments share.
 
     Args:
-        scenario: a name, code or an object, see `registry.find_scenario`.
-        num_worlds: B.
-        autoreset: whether worlds begin anew where an episode ended.
-        keywords: all optional.
-            backend: name of the physics ("numba").
-            drivers: players of seats by agent, see `registry.make_agent`: names, paths
+        scenario: Name, code or object, see `registry.find_scenario`.
+        num_worlds: Number of worlds, B.
+        autoreset: Whether a new episode begins where one ended.
+        keywords: Keywords, all optional:
+            backend: Name of the physics ("numba").
+            drivers: Drivers of seats by agent, see `registry.make_agent`: names, paths
                 of policies, functions, models and so on; the other seats are open.
             seats: "robot" or "arcade".
-            profile: "ideal", or what a robot senses and how far physics may vary:
+            profile: "ideal", or the sensing and the spread of physics of a robot:
                 "ur5e", "ur5e-authors" or "gantry", or a file,
                 see `profiles.find_profile`.
             observe: "velocity" (in the ideal profile), "history" (in the others),
                 "estimate" or "pixels", see `observable.OBSERVE`.
             goals: "flat" or "dict".
-            physics: a preset's name, a TOML file, or parameters by name, values or
-                (low, high) drawn per episode, which may name a ``preset``.
-            control_dt: s between two actions (0.05).
-            substeps: least number of physics steps in one control step (the
+            physics: Name of a preset, a TOML file, or parameters by name, values or
+                (low, high) sampled per episode, which may name a ``preset``.
+            control_dt: Time between two actions, s (0.05).
+            substeps: Least number of physics steps in one control step (the
                 backend's own); not for numba, which has none.
-            max_cycles: length of an episode in control steps.
-            options: the scenario's own fields.
-            rig: file of a real table's devices and their calibration, for the backend
+            max_cycles: Length of an episode in control steps.
+            options: Fields of the scenario by name.
+            rig: File of a real table's devices and their calibration, for the backend
                 "real" alone, see `rig.Rig`.
+        forms: Forms of observations of players who take open seats later, such as
+            those of a `Roster`; those of the keywords' drivers are known.
 
     Raises:
-        UnknownKeywordError: a keyword that is none of these; TypeError and ValueError.
-        ValueError: an unknown name or a value that makes no sense, named.
-        RuntimeError: a backend that cannot run here, with the fix.
+        UnknownKeywordError: A keyword that is none of these; TypeError and ValueError.
+        ValueError: An unknown name or a value that makes no sense, named.
+        RuntimeError: A backend that cannot run here, with the fix.
     """
     for name in keywords:
         if name not in Keywords.__annotations__:
@@ -94,55 +98,107 @@ def build_world(
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
     game = scenario_of(scenario, keywords)
-    scene = game.scene
+    profile, max_cycles = keywords.get("profile", "ideal"), keywords.get("max_cycles")
+    backend = _backend(game, num_worlds, keywords, max_cycles)
+    physics = _physics(game, backend, keywords, real=backend.senses_itself)
+    drivers = _drivers(game, backend, keywords)
+    if backend.senses_itself:
+        backend.expect(_physics(game, backend, keywords, real=False))
+    if backend.senses_itself or "rig" in keywords:
+        backend.connect(keywords.get("rig", ""))
+    usual = "velocity" if profile == "ideal" else "history"
+    own = [driver.observe for driver in drivers.values() if driver.observe]
+    # Each once, in this order: the first is the form of the open seats.
+    every = dict.fromkeys([keywords.get("observe", usual), *own, *forms])
+    return World(game, backend, drivers, physics, tuple(every), max_cycles, autoreset)
+
+
+def build_driven_world(
+    driver: Driver,
+    scenario: str | Scenario,
+    num_worlds: int,
+    keywords: Keywords,
+    forms: Collection[str] = (),
+) -> World:
+    """Build worlds in which a driver controls ``paddle_0`` and its teammates' seats.
+
+    All other seats need drivers, too. Episodes do not restart.
+
+    Args:
+        driver: Driver of the team of ``paddle_0``.
+        scenario: Name of the scenario, or a scenario object.
+        num_worlds: Number of worlds.
+        keywords: Keywords of the environment; its drivers replace that of teammates.
+        forms: See `build_world`.
+
+    Raises:
+        ValueError: A seat without a driver, named.
+    """
+    if "paddle_0" in keywords.get("drivers", {}):
+        raise ValueError("drivers: paddle_0 is the seat of the driver that is measured")
+    scene = scenario_of(scenario, keywords).scene
+    team = [i for i, s in enumerate(scene.seats) if s.team == scene.seats[0].team]
+    own = {f"paddle_{i}": driver for i in team}
+    drivers = {**own, **keywords.get("drivers", {}), "paddle_0": driver}
+    driven: Keywords = {**keywords, "drivers": drivers}
+    world = build_world(scenario, num_worlds, False, driven, forms)
+    if len(world.open):
+        raise ValueError(
+            f"{world.scenario.name!r} has more seats: say who drives paddle_"
+            f"{world.open[0]}, e.g. --driver paddle_{world.open[0]}=goalkeeper"
+        )
+    return world
+
+
+def _backend(
+    game: Scenario, num_worlds: int, keywords: Keywords, max_cycles: int | None
+) -> Backend:
+    """Return the backend that keywords name, for the scene of a scenario."""
     name = keywords.get("backend", DEFAULT_BACKEND)
     kind = find_backend(name)
-    reason = kind.supports(scene)
+    reason = kind.supports(game.scene)
     if reason:
         raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
-    control_dt = keywords.get("control_dt", 0.05)
-    substeps = keywords.get("substeps")
-    max_cycles = keywords.get("max_cycles")
+    control_dt, substeps = keywords.get("control_dt", 0.05), keywords.get("substeps")
     _check_times(control_dt, substeps, max_cycles)
-    profile = keywords.get("profile", "ideal")
-    given = keywords.get("physics")
-    backend = kind(scene, num_worlds, control_dt, substeps)
-    physics = Physics(
-        scene.defaults, profile, given, arms=not kind.ideal, real=kind.realtime
+    return kind(game.scene, num_worlds, control_dt, substeps)
+
+
+def _physics(
+    game: Scenario, backend: Backend, keywords: Keywords, real: bool
+) -> Physics:
+    """Return the ranges of physics that keywords name, see `Physics` for ``real``."""
+    return Physics(
+        game.scene.defaults,
+        keywords.get("profile", "ideal"),
+        keywords.get("physics"),
+        arms=not backend.tracks_commands,
+        real=real,
     )
-    usual = "velocity" if profile == "ideal" else "history"
-    agents = [f"paddle_{i}" for i in range(len(scene.seats))]
+
+
+def _drivers(game: Scenario, backend: Backend, keywords: Keywords) -> dict[int, Driver]:
+    """Return the drivers that keywords name, by seat."""
+    agents = [f"paddle_{i}" for i in range(len(game.scene.seats))]
+    given = keywords.get("drivers", {})
+    if not isinstance(given, Mapping):
+        raise ValueError(f"drivers: {given!r} is no dict of drivers by agent")
     drivers: dict[int, Driver] = {}
-    given_drivers = keywords.get("drivers", {})
-    if not isinstance(given_drivers, Mapping):
-        raise ValueError(f"drivers: {given_drivers!r} is no dict of players by agent")
-    for agent, driver in given_drivers.items():
+    for agent, driver in given.items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
         drivers[agents.index(agent)] = seated = make_agent(driver)
-        refuse_erratic(agent, seated, kind.realtime)
-    if kind.realtime:
-        backend.expect(Physics(scene.defaults, profile, given, arms=not kind.ideal))
-    if kind.realtime or "rig" in keywords:
-        backend.connect(keywords.get("rig", ""))
-    return World(
-        game,
-        backend,
-        drivers,
-        physics,
-        keywords.get("observe", usual),
-        max_cycles,
-        autoreset,
-    )
+        refuse_erratic(agent, seated, backend)
+    return drivers
 
 
-def refuse_erratic(agent: str, driver: Driver, realtime: bool) -> None:
+def refuse_erratic(agent: str, driver: Driver, backend: Backend) -> None:
     """Do nothing if a driver may move what a backend moves.
 
     Raises:
-        ValueError: it is erratic, and a real arm would follow it.
+        ValueError: It is erratic, and a real arm would follow it.
     """
-    if realtime and driver.erratic:
+    if backend.senses_itself and driver.erratic:
         raise ValueError(f"{agent}: {driver!r} must not move a real arm")
 
 

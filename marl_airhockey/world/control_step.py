@@ -1,4 +1,7 @@
-"""Control step: limits, physics and rules as one pipeline on arrays that stay."""
+"""Control step: limits, servo, physics, rules and observation as one pipeline.
+
+All stages work on preallocated arrays, which are overwritten in place.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,12 @@ from marl_airhockey.core.rows import clear_rows
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.core.servo import servo_stage
 from marl_airhockey.core.state import State
+from marl_airhockey.jit.fused import Sink
 from marl_airhockey.jit.pipeline import Pipeline, Stage
 from marl_airhockey.types import Array, Memory
+from marl_airhockey.world.actions import Inputs
 from marl_airhockey.world.episode import Episode
+from marl_airhockey.world.observer import Observer
 from marl_airhockey.world.referee import Referee, Step, Verdict
 
 
@@ -22,15 +28,17 @@ class Moment(NamedTuple):
     """State of B worlds and of their episodes, and the step that led to it."""
 
     state: State
-    ordered: Limited
-    """What the limits passed, and by how much the actions exceeded them"""
-    limited: Limited
-    """What the paddles do: the same, or with a servo what follows it"""
+    commanded: Limited
+    """Commands that the limits passed, and by how much the actions exceeded them"""
+    realized: Limited
+    """Commands that the paddles follow: the same, or a servo's response to them"""
     rate: Array
     """Acceleration of the servos (B, S, 2), m/s2"""
     verdict: Verdict
     episode: Episode
     """Counters, those of the verdict among them"""
+    shown: Sink
+    """Observations of all seats from the true state, see `Observer.stage`"""
 
     def write(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Copy rows of a state and a memory into some worlds, by index."""
@@ -39,38 +47,42 @@ class Moment(NamedTuple):
             self.verdict.memory[name][worlds] = row
 
     def begin(self, worlds: Array) -> None:
-        """Begin to count anew in some worlds, by index, from paddles at rest."""
-        counts = (*self.episode.running, self.limited.acceleration)
+        """Reset the counters in some worlds, by index; paddles accelerate from 0."""
+        counts = (*self.episode.running, self.realized.acceleration)
         clear_rows(worlds, tuple(x.reshape(len(x), -1) for x in counts))
-        self.ordered.velocity[worlds] = self.state.paddle_velocity[worlds]
-        self.ordered.acceleration[worlds] = self.rate[worlds] = 0.0
+        self.commanded.velocity[worlds] = self.state.paddle_velocity[worlds]
+        self.commanded.acceleration[worlds] = self.rate[worlds] = 0.0
 
 
 class ControlStep:
     """Control step of B worlds, from actions to rewards.
 
-    There are two moments, before and after, which change their parts at every step:
-    what one holds is overwritten by the step after the next. The rules are compiled
-    when it is built. Copies and pickles hold the arrays and compile nothing anew.
+    There are two moments, before and after, which swap roles at every step: what one
+    holds is overwritten by the step after the next. Rules and observations are compiled
+    when it is built. Copies and pickles hold the arrays and compile nothing again.
 
     Args:
-        backend: moves the bodies.
-        referee: applies the rules.
-        reach: of the seats.
-        limit: (B,) control steps after which the clock ends an episode.
-        episode: of all worlds; its arrays are used.
-        state: of all worlds, where they begin.
-        memory: of all worlds, where they begin.
-        lags: True if paddles follow their orders as a servo does.
+        inputs: Inputs of every step, used by reference.
+        backend: Physics.
+        referee: Rules.
+        observer: Observations.
+        reach: Reach of the seats.
+        limit: Control steps (B,) after which the clock ends an episode.
+        episode: Counters of all worlds, used by reference.
+        state: State of all worlds at the beginning.
+        memory: Memory of all worlds at the beginning.
+        lags: Whether paddles follow their commands as a servo does.
 
     Raises:
-        ValueError: a memory whose arrays change their type or shape in a step, named.
+        ValueError: A memory whose arrays change their type or shape in a step, named.
     """
 
     def __init__(
         self,
+        inputs: Inputs,
         backend: Backend,
         referee: Referee,
+        observer: Observer,
         reach: ReachPlanes,
         limit: Array,
         episode: Episode,
@@ -78,18 +90,11 @@ class ControlStep:
         memory: Memory,
         lags: bool = False,
     ) -> None:
-        self._backend, self._referee, self._reach = backend, referee, reach
-        self._limit, self._name = limit, referee.scenario.name
-        self._lags = lags
-        b, seats = len(limit), len(reach.share)
-        self.action = np.zeros((b, seats, 2))
-        """(B, seats, 2) actions after their delay: fractions of top speed, ego frames;
-        to be filled, like the next three"""
-        still = Command.still(backend.scene, b)
-        self.prescribed, self.closed = still.prescribed, still.closed
-        self.raised = still.raised
-        self._late = np.zeros_like(self.action)
-        """(B, seats, 2) what servos make of the orders, as actions"""
+        self._inputs, self._backend, self._referee = inputs, backend, referee
+        self._observer, self._reach, self._limit = observer, reach, limit
+        self._name, self._lags = referee.scenario.name, lags
+        self._response = np.zeros_like(inputs.action)
+        """(B, seats, 2) responses of the servos to the commands, as actions"""
         self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
         self._now = 0
         self._pipelines: list[Pipeline] = []
@@ -117,17 +122,20 @@ class ControlStep:
         return self._moments[self._now]
 
     def _moment(self, state: State, memory: Memory, episode: Episode) -> Moment:
-        """Return a moment with arrays of its own, as a step that goes nowhere fills."""
+        """Return a moment with arrays of its own, filled as by a step of no time."""
         here, b = self._backend.empty_state(), len(self._limit)
         here.write(np.arange(b), state)
-        limited = Limited.empty(b, len(self._reach.share))
-        ordered = Limited.empty(b, len(self._reach.share)) if self._lags else limited
-        step = Step(here, limited.velocity, here, memory, episode, self._limit)
+        realized = Limited.empty(b, len(self._reach.share))
+        commanded = realized
+        if self._lags:
+            commanded = Limited.empty(b, len(self._reach.share))
+        step = Step(here, realized.velocity, here, memory, episode, self._limit)
         verdict = self._referee.prepare(step)
         _check_memory(memory, verdict.memory)
         counted = episode.counted(verdict.counters)
-        rate = np.zeros_like(limited.velocity)
-        return Moment(here, ordered, limited, rate, verdict, counted)
+        rate = np.zeros_like(realized.velocity)
+        shown = self._observer.prepare(here, verdict.memory)
+        return Moment(here, commanded, realized, rate, verdict, counted, shown)
 
     def _compile(self) -> None:
         first, second = self._moments
@@ -135,17 +143,20 @@ class ControlStep:
         self._pipelines = [self._pipeline(*pair) for pair in pairs]
 
     def _limits(self, before: Moment, after: Moment) -> list[Stage]:
-        """Return the stages from actions to what the paddles are to do."""
+        """Return the stages from actions to the commands that paddles follow."""
         state, physics = before.state, before.episode.physics
+        action, prescribed = self._inputs.action, self._inputs.prescribed
         top, reach = physics["paddle_speed"], self._reach
         shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
-        last = before.limited.velocity if self._backend.late else state.velocity
-        moved = state.position, last, before.limited.acceleration
+        # Measured velocities come late: there the last command is taken instead.
+        last = state.velocity
+        if self._backend.senses_itself:
+            last = before.realized.velocity
+        moved = state.position, last, before.realized.acceleration
         if not self._lags:
-            given = self.action, self.prescribed, moved
-            return [limits_stage(*given, *shared, after.limited)]
-        old, new = before.ordered, after.ordered
-        ordered = state.position, old.velocity, old.acceleration
+            return [limits_stage(action, prescribed, moved, *shared, after.realized)]
+        old, new = before.commanded, after.commanded
+        commanded = state.position, old.velocity, old.acceleration
         servo = servo_stage(
             (old.velocity, new.velocity),
             state.velocity,
@@ -154,18 +165,18 @@ class ControlStep:
             top,
             reach,
             self._backend.control_dt,
-            self._late,
+            self._response,
         )
         # Twice, as what lags must stay within the reach as well.
         return [
-            limits_stage(self.action, self.prescribed, ordered, *shared, new),
+            limits_stage(action, prescribed, commanded, *shared, new),
             servo,
-            limits_stage(self._late, self.prescribed, moved, *shared, after.limited),
+            limits_stage(self._response, prescribed, moved, *shared, after.realized),
         ]
 
     def _pipeline(self, before: Moment, after: Moment) -> Pipeline:
-        state, velocity = before.state, after.limited.velocity
-        command = Command(velocity, self.prescribed, self.closed, self.raised)
+        state, velocity = before.state, after.realized.velocity
+        command = Command(velocity, *self._inputs[1:])
         step = Step(
             *(state, velocity, after.state, before.verdict.memory),
             *(before.episode, self._limit),
@@ -174,6 +185,7 @@ class ControlStep:
             *self._limits(before, after),
             self._backend.stage(command, state, after.state),
             self._referee.stage(step, after.verdict),
+            *self._observer.stage(after.state, after.verdict.memory, after.shown),
         ]
         return Pipeline(len(self._limit), stages, self._name)
 

@@ -1,4 +1,4 @@
-"""DrivenSeat seats: seats inside the environment, each with a driver."""
+"""Driven seat: a seat that is controlled by a driver inside the environment."""
 
 from __future__ import annotations
 
@@ -10,16 +10,22 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.core.state import State
-from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.delay import ALL, Rows
+from marl_airhockey.types import ALL, Array, Memory, Rows
 from marl_airhockey.world.observer import Observation, Observer
 
 
 class DrivenSeat:
-    """DrivenSeat seat of B worlds: its driver, the driver's memory and pace.
+    """Seat of B worlds that is controlled by a driver, with the driver's memory.
+
+    Args:
+        index: Index of the seat.
+        driver: Driver, which is entered as a context manager.
+        observer: Observer of the worlds.
+        num_worlds: Number of worlds, B.
+        control_dt: Time of a step, s.
 
     Raises:
-        ValueError: a driver whose control_dt is no multiple of the environment's, or
+        ValueError: A driver whose control_dt is no multiple of the environment's, or
             which cannot act on its observations.
     """
 
@@ -42,7 +48,7 @@ class DrivenSeat:
                 f"driver of paddle_{index}: its control_dt {own} s is not a multiple "
                 f"of the environment's {control_dt} s"
             )
-        self._layout = observer.prepare(driver.observe or observer.observe)
+        self._layout = observer.layout_of(driver.observe or observer.observe)
         driver.check(observer.blank(driver.observe, 3))
         self._num_worlds = num_worlds
         self._purpose = f"driver {index}"
@@ -52,12 +58,12 @@ class DrivenSeat:
         driver.__enter__()
 
     def reset(self, worlds: Array, seeds: Array, episodes: Array) -> None:
-        """Begin an episode in some worlds, by index, with random streams of its own."""
+        """Begin an episode in some worlds, by index (W,), with new random streams."""
         self._streams.renew(worlds, seeds, episodes)
         self.begin(worlds)
 
     def begin(self, worlds: Array) -> None:
-        """Begin with a new memory in some worlds, by index."""
+        """Begin an episode in some worlds, by index (W,), with the same streams."""
         self._held[worlds] = 0.0
         rng = self._streams.of(self._purpose, worlds)
         rows = self.driver.reset(self._seat, rng, len(worlds))
@@ -68,7 +74,7 @@ class DrivenSeat:
             self._memory[name][worlds] = row
 
     def measured(self) -> Array | None:
-        """Return (B, 4) where the paddle is, if the driver prescribes its motion."""
+        """Return (B, 4) the measured paddle, if the driver is position-driven."""
         return self.driver.measured()
 
     def act(
@@ -88,15 +94,17 @@ class DrivenSeat:
         answer = self.driver.act(view, kept)
         who = f"driver of paddle_{self.index} ({type(self.driver).__name__})"
         if not (isinstance(answer, tuple) and len(answer) == 2):
-            raise ValueError(f"{who}: act() must give two things, (action, memory)")
+            raise ValueError(f"{who}: act() must return (action, memory)")
         action, kept = answer
         if action.shape != held.shape:
             raise ValueError(
-                f"{who}: act() must give numbers of shape {held.shape}, got "
+                f"{who}: act() must return an action of shape {held.shape}, got "
                 f"{action.shape}"
             )
         if not np.isfinite(action).all():
-            raise ValueError(f"{who}: act() gave nan or inf; numbers must be finite")
+            raise ValueError(
+                f"{who}: act() returned nan or inf; actions must be finite"
+            )
         for name, value in kept.items():
             self._memory[name][worlds] = value
         self._held[worlds] = np.where(due[:, None], action, held)
@@ -112,13 +120,13 @@ class DrivenSeat:
         """Return the view of the driver in some worlds; arrays are of all of them."""
 
         def read() -> Observation:
-            seats, want = np.array([self.index]), self.driver.observe
-            shown = self._observer.read(sensed, memory, seats, want, worlds)
+            seats, form = np.array([self.index]), self.driver.observe
+            shown = self._observer.read(sensed, memory, seats, form, worlds)
             if isinstance(shown, Mapping):
                 return {name: array[:, 0] for name, array in shown.items()}
             return np.asarray(shown)[:, 0]
 
-        state, known = self._observer.seen(sensed, memory)
+        state, known = self._observer.known(sensed, memory)
         if worlds is not ALL:
             state = state.map(lambda x: x[worlds])
             known = {name: value[worlds] for name, value in known.items()}

@@ -1,8 +1,8 @@
-"""Observer: shows sensed states to seats, as arrays, dicts of goals, or pictures."""
+"""Observer: observations of all seats, as arrays, dicts of goals, or pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -13,17 +13,17 @@ from marl_airhockey.contracts.observable import (
     OBSERVE,
     EgoView,
     ObservationContext,
+    ObservationLayout,
 )
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.state import State
 from marl_airhockey.jit.fused import Fused, Sink, Source
-from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.delay import ALL, Rows
-from marl_airhockey.world.layout import ObservationLayout
-from marl_airhockey.world.perception import Parts, Perception
-from marl_airhockey.world.sensor import Sensor
+from marl_airhockey.jit.pipeline import Stage
+from marl_airhockey.sensing.reaction import Parts, ReactionDelay
+from marl_airhockey.sensing.sensor import Sensor
+from marl_airhockey.types import ALL, Array, Memory, Rows
 
 Observation = Array | Mapping[str, Array]
 """(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
@@ -32,56 +32,77 @@ GOALS = ("achieved_goal", "desired_goal")
 
 
 class Observer:
-    """Observer of sensed states for all seats, in the form that each of them wants.
+    """Observer of sensed states, for all seats and in several forms.
 
-    With a reaction, all but a seat's own paddle is shown as it was then; `begin` and
-    `note` must be called with what is sensed.
+    An observation is made in one of two ways: `stage` fills arrays from the true state
+    as part of the control step, where that is all that seats observe; `read` returns
+    any form for any seats and worlds.
+
+    With a reaction time, all but a seat's own paddle is observed with this latency;
+    `begin` and `note` must be called with what is sensed.
 
     Args:
-        scenario: lists the observables, and says how late seats see.
-        sensor: keeps the history.
-        physics: tells the top speed.
-        observe: the form for open seats, see `layout.OBSERVE`.
+        scenario: Scenario, which lists the observables and has the reaction time.
+        sensor: Sensor, which keeps the history.
+        physics: Ranges of the top speed.
+        forms: Forms of observations that can be read, see `observable.OBSERVE`; the
+            first one is that of the open seats.
+
+    Raises:
+        ValueError: An unknown form, or a reaction time that is no multiple of the
+            control step.
     """
 
     def __init__(
-        self, scenario: Scenario, sensor: Sensor, physics: Physics, observe: str
+        self,
+        scenario: Scenario,
+        sensor: Sensor,
+        physics: Physics,
+        forms: Collection[str],
     ) -> None:
-        self.scenario, self.sensor, self.observe = scenario, sensor, observe
+        self.scenario, self.sensor, self.forms = scenario, sensor, tuple(forms)
+        for form in forms:
+            if form not in OBSERVE:
+                raise ValueError(unknown_name("observe", form, OBSERVE))
+        self.observe = self.forms[0]
+        """Form of the open seats' observations."""
         self._top_speed = physics.highest("paddle_speed")
-        steps = round(scenario.reaction / sensor.control_dt)
-        if abs(steps * sensor.control_dt - scenario.reaction) > 1e-6:
-            near = [k * sensor.control_dt for k in (steps, steps + 1)]
-            raise ValueError(
-                f"reaction: {scenario.reaction:g} s is no multiple of control_dt, "
-                f"{sensor.control_dt:g} s; give another control_dt or an option, e.g. "
-                f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
-            )
-        self._perception = Perception(steps) if steps else None
+        steps = _whole_steps(scenario.reaction, sensor.control_dt)
+        self._delay = ReactionDelay(steps) if steps else None
         self.reaction = steps * sensor.control_dt
-        """s by which seats see late"""
+        """Latency of observations by the rules of the game, s."""
+        self.direct = self.observe == "velocity" and sensor.ideal and not steps
+        """True if open seats observe the true state, so that `stage` fills it in."""
         self._layouts: dict[str, ObservationLayout] = {}
-        self._shows: dict[str, Fused] = {}
-        self.prepare(observe)
+        self._fused: dict[str, Fused] = {}
+        self.layout_of(self.observe)
 
-    def prepare(self, observe: str) -> ObservationLayout:
-        """Return the layout of a form; pictures have that of velocities beside them."""
-        if observe not in OBSERVE:
-            raise ValueError(unknown_name("observe", observe, OBSERVE))
-        self.sensor.keeps_history |= observe != "velocity"
-        self.sensor.estimates |= observe == "estimate"
-        if observe not in self._layouts:
-            form = "velocity" if observe == "pixels" else observe
+    def layout_of(self, form: str) -> ObservationLayout:
+        """Return the layout of a form; that of "pixels" is the one of "velocity".
+
+        Raises:
+            ValueError: A form that these worlds were not built for.
+        """
+        if form not in self.forms:
+            raise ValueError(
+                f"observe: {form!r} cannot be read here, only {', '.join(self.forms)}; "
+                f"name it when the worlds are built, forms=({form!r},)"
+            )
+        if form not in self._layouts:
             scope = ObservationContext(
-                self.scenario.scene, form, self._top_speed, self.reaction
+                self.scenario.scene,
+                "velocity" if form == "pixels" else form,
+                self._top_speed,
+                self.reaction,
             )
             apart = self.scenario.goals == "dict"
             observables = tuple(
                 p for p in self.scenario.observation if not (apart and p.goal)
             )
-            self._layouts[observe] = layout = ObservationLayout(observables, scope)
-            self._shows[observe] = self._compiled(layout)
-        return self._layouts[observe]
+            self._layouts[form] = layout = ObservationLayout(observables, scope)
+            show = partial(self._show, layout)
+            self._fused[form] = Fused(show, self.scenario.name)
+        return self._layouts[form]
 
     @property
     def layout(self) -> ObservationLayout:
@@ -90,217 +111,182 @@ class Observer:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the numbers that open seats are shown; none for pictures."""
+        """Names of the numbers that open seats observe; none for pictures."""
         return () if self.observe == "pixels" else self.layout.labels
 
-    def compile(self, sensed: State, memory: Memory) -> None:
-        """Compile all forms of observations, unless they are, for arrays like these."""
-        for form, show in self._shows.items():
-            if not show.prepared:
-                show.prepare(*self._sources(sensed, memory, form))
-
     def begin(self, worlds: Array, sensed: State, memory: Memory) -> None:
-        """Begin with what is sensed in some worlds, by index; arrays are of all."""
-        if self._perception is not None:
-            self._perception.begin(worlds, self._parts(sensed, memory))
-
-    def note(self, sensed: State, memory: Memory) -> None:
-        """Take note of what is sensed after a step."""
-        if self._perception is not None:
-            self._perception.push(self._parts(sensed, memory))
-
-    def _parts(self, sensed: State, memory: Memory) -> Parts:
-        """Return what is seen late."""
-        past = {**self.sensor.past(), "frames": self.sensor.frames}
-        parts = {"state": vars(sensed), "memory": memory, "sensor": past}
-        if self.sensor.estimates:
-            parts["estimate"] = vars(self.sensor.estimated(sensed))
-        return parts
-
-    def seen(
-        self, sensed: State, memory: Memory, form: str = "velocity"
-    ) -> tuple[State, Memory]:
-        """Return the state and the memory of all worlds as seats see them.
+        """Begin an episode in some worlds, by index; compile what is not compiled yet.
 
         Args:
-            sensed: now.
-            memory: now.
-            form: see `observable.OBSERVE`; "estimate" for estimated pucks.
+            worlds: Indices (W,) of the worlds.
+            sensed: Sensed state of all worlds, table frame.
+            memory: Memory of the scenario in all worlds.
         """
-        if self._perception is None:
-            estimate = form == "estimate"
-            return self.sensor.estimated(sensed) if estimate else sensed, memory
-        seen = self._perception.seen
-        state = seen("estimate" if form == "estimate" else "state")
-        return replace(sensed, **state), seen("memory")
+        if self._delay is not None:
+            self._delay.begin(worlds, self._parts(sensed, memory))
+        for form, fused in self._fused.items():
+            if not fused.prepared:
+                fused.prepare(*self._sources(sensed, memory, form))
 
-    def _sources(
-        self, sensed: State, memory: Memory, form: str
-    ) -> tuple[Source, Source, Source]:
-        """Return the arrays of all worlds from which a form of observations is made."""
-        state, known = self.seen(sensed, memory, form)
-        sensor = self.sensor.past()
-        if self._perception is not None:
-            # The own paddle, and what it was asked for, are known at once.
-            sensor["history"] = self._perception.seen("sensor")["history"]
-            # Contiguous, as compiled loops take them.
-            own = sensed.paddle, sensed.paddle_velocity
-            sensor["place"], sensor["motion"] = map(np.ascontiguousarray, own)
-        return vars(state), known, sensor
+    def note(self, sensed: State, memory: Memory) -> None:
+        """Append what is sensed after a step to what is observed later."""
+        if self._delay is not None:
+            self._delay.push(self._parts(sensed, memory))
+
+    def known(
+        self, sensed: State, memory: Memory, form: str = "velocity"
+    ) -> tuple[State, Memory]:
+        """Return the state and the memory of all worlds as seats know them now.
+
+        Args:
+            sensed: Sensed state now.
+            memory: Memory now.
+            form: "estimate" for estimated pucks, any other form for sensed ones.
+        """
+        estimate = form == "estimate"
+        if self._delay is None:
+            return self.sensor.estimated(sensed) if estimate else sensed, memory
+        state = self._delay.delayed("estimate" if estimate else "state")
+        return replace(sensed, **state), self._delay.delayed("memory")
+
+    def prepare(self, state: State, memory: Memory) -> Sink:
+        """Return arrays for `stage` to fill, for arrays like these; none if not direct.
+
+        They are those of all seats in all worlds, by name.
+        """
+        if not self.direct:
+            return {}
+        fused, past = self._fused[self.observe], self.sensor.past()
+        (shown,) = fused.prepare(vars(state), memory, past)
+        return shown
+
+    def stage(self, state: State, memory: Memory, shown: Sink) -> list[Stage]:
+        """Return the stage that fills ``shown`` from the true state; [] if not direct.
+
+        All arrays are used by reference.
+        """
+        if not self.direct:
+            return []
+        sources = vars(state), memory, self.sensor.past()
+        return [self._fused[self.observe].stage(sources, (shown,))]
 
     def read(
         self,
         sensed: State,
         memory: Memory,
         seats: Array,
-        observe: str | None = None,
+        form: str | None = None,
         worlds: Rows = ALL,
     ) -> Observation:
         """Return observations of some seats, in their order, freshly allocated.
 
         Args:
-            sensed: the sensed state of all worlds, table frame.
-            memory: the scenario's, of all worlds.
-            seats: (n,) indices of seats.
-            observe: the form; None for the open seats'.
-            worlds: which of them to show.
+            sensed: Sensed state of all worlds, table frame.
+            memory: Memory of the scenario in all worlds.
+            seats: Indices (n,) of the seats.
+            form: Form of the observations; None for that of the open seats.
+            worlds: Worlds to observe.
         """
-        observe = observe or self.observe
-        if observe == "pixels":
+        form = form or self.observe
+        self.layout_of(form)
+        if form == "pixels":
             return self._pictures(memory, seats, worlds)
-        self.prepare(observe)
-        show, sources = self._shows[observe], self._sources(sensed, memory, observe)
+        fused, sources = self._fused[form], self._sources(sensed, memory, form)
         every = isinstance(worlds, slice)
-        (shown,) = show(*sources) if every else show.at(np.asarray(worlds), *sources)
-        return self.take(shown, seats)
+        (shown,) = fused(*sources) if every else fused.at(np.asarray(worlds), *sources)
+        return self.of_seats(shown, seats)
 
-    def blank(self, observe: str | None, rows: int) -> Observation:
+    def of_seats(self, shown: Sink, seats: Array) -> Observation:
+        """Return the observations of some seats from those of all; no copy of all."""
+        flat = shown["flat"]
+        if len(seats) != len(self.scenario.scene.seats):
+            flat = flat[:, seats]
+        if len(shown) == 1:
+            return flat
+        return {"observation": flat, **{name: shown[name] for name in GOALS}}
+
+    def blank(self, form: str | None, rows: int) -> Observation:
         """Return observations of one seat that are all zeros, (rows, ...) each.
 
         Args:
-            observe: the form; None for the open seats'.
-            rows: their number.
+            form: Form of the observations; None for that of the open seats.
+            rows: Number of rows.
         """
-        observe = observe or self.observe
-        if observe == "pixels":
+        form = form or self.observe
+        layout = self.layout_of(form)
+        if form == "pixels":
             return np.zeros((rows, PIXELS, PIXELS, FRAMES), np.uint8)
-        size = len(self.prepare(observe).labels)
-        flat, game = np.zeros((rows, size), np.float32), self.scenario
+        flat, game = np.zeros((rows, len(layout.labels)), np.float32), self.scenario
         if game.goals == "flat" or not isinstance(game, GoalScenario):
             return flat
         shape = (rows, len(game.goal_bounds))
         goals = {n: np.zeros(shape, np.float32) for n in GOALS}
         return {"observation": flat, **goals}
 
-    def take(self, shown: Sink, seats: Array) -> Observation:
-        """Return the observations of some seats from those of all, used up."""
-        if len(seats) != len(self.scenario.scene.seats):
-            shown["flat"] = shown["flat"][:, seats]
-        if len(shown) == 1:
-            return shown["flat"]
-        flat = shown.pop("flat")
-        return {"observation": flat, **shown}
+    def _parts(self, sensed: State, memory: Memory) -> Parts:
+        """Return what is observed with the latency of the game."""
+        past = {**self.sensor.past(), "frames": self.sensor.frames}
+        parts = {"state": vars(sensed), "memory": memory, "sensor": past}
+        if "estimate" in self.forms:
+            parts["estimate"] = vars(self.sensor.estimated(sensed))
+        return parts
 
-    def show(self, state: State, memory: Memory) -> Sink:
-        """Return the observations of all seats from the true state.
-
-        Empty if they need the sensor, a history or pixels (`read` is used then).
-        """
-        late = self._perception is not None
-        if self.observe != "velocity" or not self.sensor.ideal or late:
-            return {}
-        return self._flat(self.layout, state, memory, self.sensor.past())
-
-    def _flat(
-        self, layout: ObservationLayout, state: State, memory: Memory, past: Source
-    ) -> Sink:
-        """Return the numbers of a layout, and the goals beside it."""
-        game = self.scenario
-        paddle = state.paddle, state.paddle_velocity
-        if layout.scope.reaction:
-            paddle = past["place"], past["motion"]
-        sensed = past["history"], past["asked"]
-        ego = EgoView(state, memory, *sensed, paddle, layout.scope)
-        shown = {"flat": layout.read(ego)}
-        if game.goals == "dict" and isinstance(game, GoalScenario):
-            goals = game.achieved(state, memory), game.desired(memory)
-            for name, goal in zip(GOALS, goals, strict=True):
-                shown[name] = goal[..., None, :].astype(np.float32)
-        return shown
-
-    def _compiled(self, layout: ObservationLayout) -> Fused:
-        """Return `_flat` of sources, as one loop over the worlds."""
-        return Fused(partial(self._show, layout), self.scenario.name)
+    def _sources(
+        self, sensed: State, memory: Memory, form: str
+    ) -> tuple[Source, Source, Source]:
+        """Return the arrays of all worlds from which a form of observations is made."""
+        state, known = self.known(sensed, memory, form)
+        sensor = self.sensor.past()
+        if self._delay is not None:
+            # The own paddle, and what was requested of it, are known immediately.
+            sensor["history"] = self._delay.delayed("sensor")["history"]
+            # Contiguous, as compiled loops take them.
+            own = sensed.paddle, sensed.paddle_velocity
+            sensor["own"], sensor["own_velocity"] = map(np.ascontiguousarray, own)
+        return vars(state), known, sensor
 
     def _show(
         self, layout: ObservationLayout, sensed: Source, memory: Memory, sensor: Source
     ) -> tuple[Sink]:
-        return (self._flat(layout, State(**sensed), memory, sensor),)
-
-    def after_step(
-        self,
-        shown: Sink,
-        sensed: State,
-        memory: Memory,
-        seats: Array,
-        served: Array | None,
-    ) -> Observation:
-        """Return the observations of some seats after a step, freshly allocated.
-
-        Args:
-            shown: result of `show` for the new state.
-            sensed: the sensed state of all worlds, table frame.
-            memory: the scenario's, of all worlds.
-            seats: (n,) indices of seats.
-            served: worlds, by index, whose state has changed since; None for none.
-        """
-        if not shown:
-            return self.read(sensed, memory, seats)
-        own = {name: array.copy() for name, array in shown.items()}
-        observation = self.take(own, seats)
-        if served is not None:
-            self.renew(observation, sensed, memory, seats, served)
-        return observation
-
-    def renew(
-        self,
-        observation: Observation,
-        sensed: State,
-        memory: Memory,
-        seats: Array,
-        worlds: Array,
-    ) -> None:
-        """Read an observation anew in some worlds, in place.
-
-        Args:
-            observation: of all worlds.
-            sensed: the sensed state of all worlds, table frame.
-            memory: the scenario's, of all worlds.
-            seats: (n,) indices of seats.
-            worlds: (W,) indices.
-        """
-        fresh: Observation
-        if self.observe == "pixels":
-            fresh = self._pictures(memory, seats, worlds)
-        else:
-            sources = self._sources(sensed, memory, self.observe)
-            (shown,) = self._shows[self.observe].at(worlds, *sources)
-            fresh = self.take(shown, seats)
-        if isinstance(observation, np.ndarray):
-            observation[worlds] = fresh
-        else:
-            for name, array in observation.items():
-                array[worlds] = fresh[name]
+        """Return the numbers of a layout, and the goals of goals="dict"."""
+        game, state = self.scenario, State(**sensed)
+        own = state.paddle, state.paddle_velocity
+        if layout.scope.reaction:
+            own = sensor["own"], sensor["own_velocity"]
+        past = sensor["history"], sensor["requested"]
+        shown = {"flat": layout.read(EgoView(state, memory, *past, own, layout.scope))}
+        if game.goals == "dict" and isinstance(game, GoalScenario):
+            goals = game.achieved(state, memory), game.desired(memory)
+            for name, goal in zip(GOALS, goals, strict=True):
+                shown[name] = goal[..., None, :].astype(np.float32)
+        return (shown,)
 
     def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
-        from marl_airhockey.world.pixels import pictures_of
+        from marl_airhockey.sensing.pixels import pictures_of
 
         frames, goals = self.sensor.frames, memory.get("goal")
-        if self._perception is not None:
-            frames = self._perception.seen("sensor")["frames"]
+        if self._delay is not None:
+            frames = self._delay.delayed("sensor")["frames"]
         if goals is not None:
             goals = goals[worlds]
         return pictures_of(self.scenario.scene, frames[worlds], goals, seats, PIXELS)
+
+
+def _whole_steps(reaction: float, control_dt: float) -> int:
+    """Return a reaction time in control steps.
+
+    Raises:
+        ValueError: It is no multiple of them.
+    """
+    steps = round(reaction / control_dt)
+    if abs(steps * control_dt - reaction) > 1e-6:
+        near = [k * control_dt for k in (steps, steps + 1)]
+        raise ValueError(
+            f"reaction: {reaction:g} s is no multiple of control_dt, "
+            f"{control_dt:g} s; give another control_dt or an option, e.g. "
+            f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
+        )
+    return steps
 
 
 def duplicate(observation: Observation) -> Observation:
@@ -308,3 +294,12 @@ def duplicate(observation: Observation) -> Observation:
     if isinstance(observation, np.ndarray):
         return observation.copy()
     return {name: array.copy() for name, array in observation.items()}
+
+
+def put(observation: Observation, worlds: Array, rows: Observation) -> None:
+    """Replace the observations of some worlds, by index (W,), in place."""
+    if isinstance(observation, np.ndarray):
+        observation[worlds] = rows
+    elif isinstance(rows, Mapping):
+        for name, array in observation.items():
+            array[worlds] = rows[name]

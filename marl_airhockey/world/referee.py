@@ -1,8 +1,7 @@
-"""Referee: applies the rules to a step and shows what came of it, in one loop."""
+"""Referee: the rules of a scenario, applied to a step of all worlds in one loop."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import reduce
 from typing import NamedTuple
 
@@ -28,8 +27,6 @@ class Verdict(NamedTuple):
     """``reward`` (B, seats), ``terminated``, ``truncated``, ``serves`` (B,), if the
     game serves, and ``applied_action`` (B, seats, 2) float32: fractions of top speed in
     ego frames"""
-    shown: dict[str, Array]
-    """Observation of every seat from the true state; see `Observer.show`"""
 
 
 class Step(NamedTuple):
@@ -57,24 +54,19 @@ class Step(NamedTuple):
         )
 
 
-Show = Callable[[State, Memory], Sink]
-"""Function that shows a state and a memory to every seat."""
-
-
 class Referee:
     """Rules of a scenario, and the score of its episodes.
 
     Args:
-        scenario: whose rules.
-        rotations: (S, 2, 2) from the table frame to each seat's ego frame.
-        show: shows the new state, in the same loop.
-        exact: whether paddles move as commanded, unless something stops them.
+        scenario: Scenario whose rules are applied.
+        rotations: Rotations (S, 2, 2) from the table frame to each seat's ego frame.
+        tracks_commands: Whether paddles move as commanded unless something stops them.
     """
 
     def __init__(
-        self, scenario: Scenario, rotations: Array, show: Show, exact: bool
+        self, scenario: Scenario, rotations: Array, tracks_commands: bool
     ) -> None:
-        self.scenario, self._show, self._exact = scenario, show, exact
+        self.scenario, self._tracks_commands = scenario, tracks_commands
         self._rotations = rotations
         self._straight = bool((rotations == np.eye(2)).all())
         self._fused = Fused(self._judge, scenario.name)
@@ -122,7 +114,7 @@ class Referee:
             few = t.new_memory["touches"].sum((-1, -2)) <= 1
             counters["first_shot"] = episode["first_shot"] | (fresh & few)
         # What a paddle could not do, as a puck or another paddle was in its way.
-        rotated = after.paddle_velocity if self._exact else command
+        rotated = after.paddle_velocity if self._tracks_commands else command
         if not self._straight:
             rotated = (self._rotations @ rotated[..., None])[..., 0]
         share = rotated / physics["paddle_speed"][..., None, None]
@@ -135,7 +127,7 @@ class Referee:
         serves = game.needs_serve(t)
         if serves is not None:
             outcome["serves"] = serves & ~terminated & ~over
-        return t.new_memory, terms, counters, outcome, self._show(after, t.new_memory)
+        return t.new_memory, terms, counters, outcome
 
 
 def _check_shapes(

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.state import State
 from marl_airhockey.types import Array
 from marl_airhockey.world.control_step import Moment
 from marl_airhockey.world.observer import Observation
@@ -49,7 +51,7 @@ class StepResult:
             open_seats: (open,) indices of the open seats; None for all.
         """
         outcome, terms = moment.verdict.outcome, moment.verdict.terms
-        violation, success = moment.ordered.violation.copy(), moment.episode.success
+        violation, success = moment.commanded.violation.copy(), moment.episode.success
         reward, applied = outcome["reward"], outcome["applied_action"]
         rows = (reward, applied, violation[..., -1], success, *terms.values())
         if open_seats is None:
@@ -74,3 +76,25 @@ class StepResult:
         numbers = [v for v in vars(self).values() if isinstance(v, np.ndarray)]
         for array in (*numbers, *self.terms.values()):
             array[worlds] = 0
+
+    def judge_sensed(
+        self, game: Scenario, sensed: State, moment: Moment, limit: Array
+    ) -> None:
+        """Replace reward and end by those of the sensed state, with goals="dict".
+
+        The reward must be `goal_reward` of the goals in the observation, or relabelled
+        transitions would contradict recorded ones. Success is that of the true state.
+
+        Args:
+            game: Scenario with goals="dict".
+            sensed: Sensed state of all worlds.
+            moment: Moment after the step; the returns of its episodes are corrected.
+            limit: Control steps (B,) after which the clock ends an episode.
+        """
+        episode = moment.episode
+        met = game.goal_met(sensed, moment.verdict.memory)
+        reward = 1.0 * met[:, None]
+        episode.returns[:] += reward - moment.verdict.outcome["reward"]
+        self.reward[:] = self.terms["goal"][:] = reward
+        self.terminated[:] = met | moment.state.lifted.any(-1)
+        self.truncated[:] = (episode.cycles >= limit) & ~self.terminated

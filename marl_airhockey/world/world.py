@@ -1,8 +1,21 @@
-"""World: one step function over B worlds, which all environments are views of."""
+"""World: one step function over B worlds, which all environments are views of.
+
+A step, `World.step`:
+
+1. collect: actions of open seats and drivers -> inputs, delayed (`world.actions`)
+2. limit: action -> command, followed by a servo if there is one (`core.limits`)
+3. move: command -> state (`backends`)
+4. judge: state -> memory, reward terms, success, end (`world.referee`)
+5. observe: state -> observation, where seats observe the true state (`world.observer`)
+6. sense: state -> sensed state, served pucks included (`sensing`); observe that else
+7. reset: a new episode in the worlds where one ended
+
+Steps 2 to 5 are one pipeline of compiled stages (`world.control_step`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -14,32 +27,35 @@ from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.rng import RandomStreams, StreamSet, seeds_of
 from marl_airhockey.core.seat import ReachPlanes
 from marl_airhockey.core.state import State
+from marl_airhockey.sensing.sensor import Needs, Sensor
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.episode import Episode, Selected
-from marl_airhockey.world.observer import Observation, Observer, duplicate
+from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.referee import Referee
-from marl_airhockey.world.sensed_goals import judge_sensed
-from marl_airhockey.world.sensor import Sensor
 from marl_airhockey.world.set_state import checked_memory, settled
 from marl_airhockey.world.step_result import StepResult
+
+NOWHERE = np.zeros(0, np.int64)
+"""Indices of no worlds."""
 
 
 class World:
     """B worlds of one scenario on one backend.
 
-    Worlds can be copied and pickled at any moment; the copy goes on by itself.
+    Worlds can be copied and pickled at any moment; the copy is independent.
 
     Args:
-        scenario: what is played.
-        backend: the physics, built for the scenario's scene.
-        drivers: drivers of the seats that are not open, by seat index.
-        physics: parameters and their ranges.
-        observe: how pucks are shown to open seats, see `observable.OBSERVE`.
-        max_cycles: length of an episode in control steps; None for the scenario's.
-        autoreset: begin a new episode at once where one ended.
+        scenario: Scenario.
+        backend: Physics, built for the scenario's scene.
+        drivers: Drivers of the seats that are not open, by seat index.
+        physics: Parameters and their ranges.
+        forms: Forms of observations that open seats, drivers and later players can
+            read, see `observable.OBSERVE`; the first one is that of the open seats.
+        max_cycles: Length of an episode in control steps; None for the scenario's.
+        autoreset: Whether a new episode begins immediately where one ended.
     """
 
     def __init__(
@@ -48,7 +64,7 @@ class World:
         backend: Backend,
         drivers: Mapping[int, Driver],
         physics: Physics,
-        observe: str = "velocity",
+        forms: Collection[str] = ("velocity",),
         max_cycles: int | None = None,
         autoreset: bool = True,
     ) -> None:
@@ -60,17 +76,17 @@ class World:
         self._limit = np.full(b, max_cycles or round(scenario.seconds / dt))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = ReachPlanes.of(scene.table, scene.seats)
-        self.sensor = Sensor(scene, b, physics, dt)
-        if backend.realtime:
-            self.sensor.sight = backend.sight
-        self.observer = Observer(scenario, self.sensor, physics, observe)
+        sight = backend.sight if backend.senses_itself else None
+        self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), sight)
+        self.observer = Observer(scenario, self.sensor, physics, forms)
         self.driven = [
             DrivenSeat(seat, driver, self.observer, b, dt)
             for seat, driver in sorted(drivers.items())
         ]
-        show, exact = self.observer.show, backend.ideal
-        self.referee = Referee(scenario, self.reach.rotation, show, exact)
+        rotations, tracks = self.reach.rotation, backend.tracks_commands
+        self.referee = Referee(scenario, rotations, tracks)
         self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
+        self._requested = np.zeros((b, len(seats), 2))
         self._seeded, self.seeds = False, np.zeros(b, np.uint64)
         """(B,) seed of each world"""
         self._scatters = physics.any_of(*SCATTER)
@@ -106,17 +122,17 @@ class World:
     @property
     def action(self) -> Array:
         """(B, seats, 2) actions of the last step, after their delay; a copy."""
-        return self._built.action.copy()
+        return self._actions.inputs.action.copy()
 
     @property
-    def asked(self) -> Array:
+    def requested(self) -> Array:
         """(B, seats, 2) actions of the last step, before their delay; a copy."""
-        return self._actions.asked(self._built).copy()
+        return self._requested.copy()
 
     @property
     def command(self) -> Array:
         """(B, seats, 2) command of the last step, table frame, m/s; a copy."""
-        return self._built.now.limited.velocity.copy()
+        return self._built.now.realized.velocity.copy()
 
     @property
     def terms(self) -> dict[str, Array]:
@@ -148,7 +164,7 @@ class World:
         now = self._built.now
         names = "reward", "applied_action", "terminated", "truncated"
         parts = {name: now.verdict.outcome[name].copy() for name in names}
-        return parts | {"violation": now.ordered.violation.copy()}
+        return parts | {"violation": now.commanded.violation.copy()}
 
     @property
     def _built(self) -> ControlStep:
@@ -198,7 +214,7 @@ class World:
     def reset_worlds(self, worlds: Array) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
         rng = self.draw_worlds(worlds)
-        if self.backend.realtime:
+        if self.backend.senses_itself:
             # All is compiled now, so that no time is lost once the puck moves.
             state = self.backend.arrange(self._state)
             memory = self.scenario.initial_memory(state, rng)
@@ -277,17 +293,16 @@ class World:
     def _begin(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Begin an episode in some worlds, by index, from rows of state and memory."""
         if self._step is None:
-            parts = self.backend, self.referee, self.reach, self._limit
-            lags = self.backend.ideal and self.physics.any_of("servo_time")
-            self._step = ControlStep(*parts, self._episode, rows, memory, lags)
+            rules = self.backend, self.referee, self.observer, self.reach, self._limit
+            lags = self.backend.tracks_commands and self.physics.any_of("servo_time")
+            begun = self._episode, rows, memory
+            self._step = ControlStep(self._actions.inputs, *rules, *begun, lags)
             self._adopt(self._step.now)
         self._place(worlds, rows, memory)
         self._step.now.begin(worlds)
         self._actions.reset(worlds)
-        self.sensor.begin(worlds, self._episode.physics, self._streams)
-        self._sense(worlds)
+        self._sensed = self.sensor.begin(worlds, *self._true)
         self.observer.begin(worlds, self._sensed, self._memory)
-        self.observer.compile(self._sensed, self._memory)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put rows of a state and a memory into some worlds, by index."""
@@ -298,79 +313,95 @@ class World:
         self._state, self._memory = moment.state, moment.verdict.memory
         self._episode = moment.episode
 
-    def _sense(self, starting: Array | None = None) -> None:
-        """Sense the state, beginning anew in some worlds, by index."""
-        now = self._state, self._episode.physics, self._streams
-        reset, sense = self.sensor.reset, self.sensor.sense
-        self._sensed = sense(*now) if starting is None else reset(starting, *now)
+    @property
+    def _true(self) -> tuple[State, dict[str, Array], StreamSet]:
+        """State, physics and streams that the sensor takes."""
+        return self._state, self._episode.physics, self._streams
 
     def observation(self) -> Observation:
-        """Return what the open seats are shown now, freshly allocated."""
+        """Return what the open seats observe now, freshly allocated."""
         return self.observer.read(self._sensed, self._memory, self.open)
 
     def observe(self, seats: Array) -> Observation:
-        """Return what seats (n,) would be shown as open ones, freshly allocated."""
+        """Return what seats (n,) would observe as open ones, freshly allocated."""
         return self.observer.read(self._sensed, self._memory, seats)
 
     def step(self, actions: Array, prescribed: Array | None = None) -> StepResult:
         """Move all worlds by one control step.
 
         Args:
-            actions: (B, open, 2) velocities, fractions of top speed in ego frames.
-            prescribed: (B, open, 4) measured position and velocity of paddles, ego
-                frames, m and m/s; nan for seats that ask. None: all ask.
+            actions: Velocities (B, open, 2), fractions of top speed in ego frames.
+            prescribed: Measured positions and velocities (B, open, 4) of paddles, ego
+                frames, m and m/s; nan for seats that request an action. None: all do.
 
         Raises:
-            RuntimeError: before the first `reset`.
-            ValueError: a wrong shape, or an element that is not finite.
+            RuntimeError: Before the first `reset`.
+            ValueError: A wrong shape, or an element that is not finite.
         """
-        now = self._sensed, self._memory, self._episode
-        self._actions.collect(self._built, actions, prescribed, *now)
-        if self.sensor.keeps_history:
-            self.sensor.note(self._actions.asked(self._built))
-        moment = self._built()
+        step, now = self._built, (self._sensed, self._memory, self._episode)
+        self._requested = self._actions.collect(actions, prescribed, *now)
+        self.sensor.note(self._requested)
+        moment = step()
         self._adopt(moment)
         result = StepResult.of(moment, self.open if self.driven else None)
-        self._finish_step(moment, result)
+        if self.backend.senses_itself and self.backend.interruption:
+            result.interruption = self.backend.interruption
+            result.truncated[:] = True
+        self._observe(moment, result)
+        if self.autoreset:
+            self._restart(result)
         return result
 
-    def no_step(self) -> StepResult:
+    def empty_result(self) -> StepResult:
         """Return the result of no step: all 0, without observation."""
         result = StepResult.of(self._built.now, self.open if self.driven else None)
         result.clear()
         return result
 
-    def _finish_step(self, moment: Moment, result: StepResult) -> None:
-        """Sense, serve inside episodes, observe, and reset the worlds that ended."""
-        if self.backend.realtime and self.backend.interruption:
-            result.interruption = self.backend.interruption
-            result.truncated[:] = True
-        self._sense()
+    def _observe(self, moment: Moment, result: StepResult) -> None:
+        """Sense, serve where a puck is needed, and observe."""
+        observer, seats = self.observer, self.open
+        self._sensed = self.sensor.sense(*self._true)
         if self.scenario.goals == "dict" and not self.sensor.ideal:
-            judge_sensed(self.scenario, self._sensed, moment, self._limit, result)
-        served, serves = None, moment.verdict.outcome.get("serves")
-        # count_nonzero: for few worlds, `any` costs as much as the physics.
-        if serves is not None and np.count_nonzero(serves):
-            served = np.flatnonzero(serves)
-            # `take` is several times faster than an index.
-            rows = self._state.map(lambda x: x.take(served, 0))
-            memory = {name: x.take(served, 0) for name, x in self._memory.items()}
-            rng = self._streams.of("serve", served)
-            self._place(served, *self.scenario.serve(rng, rows, memory))
-            self._sense(served)
-        self.observer.note(self._sensed, self._memory)
-        now = self._sensed, self._memory, self.open
-        shown, observer = moment.verdict.shown, self.observer
-        result.observation = observer.after_step(shown, *now, served)
-        if not self.autoreset:
+            result.judge_sensed(self.scenario, self._sensed, moment, self._limit)
+        served = self._serve(moment)
+        observer.note(self._sensed, self._memory)
+        if not observer.direct:
+            result.observation = observer.read(self._sensed, self._memory, seats)
             return
+        shown = {name: array.copy() for name, array in moment.shown.items()}
+        result.observation = observer.of_seats(shown, seats)
+        if len(served):
+            self._observe_again(result.observation, served)
+
+    def _observe_again(self, observation: Observation, worlds: Array) -> None:
+        """Replace what open seats observe in some worlds, by index, in place."""
+        now = self._sensed, self._memory, self.open
+        put(observation, worlds, self.observer.read(*now, worlds=worlds))
+
+    def _serve(self, moment: Moment) -> Array:
+        """Serve a puck where the rules need one; return these worlds, by index."""
+        serves = moment.verdict.outcome.get("serves")
+        # count_nonzero: for few worlds, `any` costs as much as the physics.
+        if serves is None or not np.count_nonzero(serves):
+            return NOWHERE
+        worlds = np.flatnonzero(serves)
+        # `take` is several times faster than an index.
+        rows = self._state.map(lambda x: x.take(worlds, 0))
+        memory = {name: x.take(worlds, 0) for name, x in self._memory.items()}
+        rng = self._streams.of("serve", worlds)
+        self._place(worlds, *self.scenario.serve(rng, rows, memory))
+        self._sensed = self.sensor.reset(worlds, *self._true)
+        return worlds
+
+    def _restart(self, result: StepResult) -> None:
+        """Begin a new episode in the worlds that ended."""
         ended = result.terminated | result.truncated
         if np.count_nonzero(ended):
             worlds = np.flatnonzero(ended)
             result.final_observation = duplicate(result.observation)
             self.reset_worlds(worlds)
-            now = self._sensed, self._memory, self.open
-            observer.renew(result.observation, *now, worlds)
+            self._observe_again(result.observation, worlds)
 
     def close(self) -> None:
         """Close the backend and leave the drivers; nothing can be played any more."""

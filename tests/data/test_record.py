@@ -10,7 +10,7 @@ from marl_airhockey.core.recording import read_recording
 from marl_airhockey.data.columns import memories_of, scenario_of, states_of
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.summary import summarize_recording
-from marl_airhockey.evaluation.evaluate import build_driven_world
+from marl_airhockey.world.build import build_driven_world
 
 
 def record(tmp_path, agent, scenario, episodes=3, **keywords):
@@ -39,7 +39,7 @@ def test_an_episode_is_what_a_world_with_its_seed_does(tmp_path, profile):
             np.testing.assert_array_equal(
                 row["observation"], world.observe(np.array([0]))[0]
             )
-            np.testing.assert_array_equal(row["action"], world.asked[0])
+            np.testing.assert_array_equal(row["action"], world.requested[0])
             np.testing.assert_array_equal(row["command"], world.command[0])
             assert row["returns"] == world.episode.returns[0]
             if profile == "ur5e":

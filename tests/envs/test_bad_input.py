@@ -43,7 +43,7 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
         ),
         (
             lambda: ah.parallel_env("duel", drivers=["striker"]),
-            "is no dict of players by agent",
+            "is no dict of drivers by agent",
         ),
         (
             lambda: ah.parallel_env("juggle", physics={"preset": ["wooden"]}),
@@ -300,7 +300,7 @@ def test_what_an_author_forgot_is_named():
     drivers = {"paddle_1": "still"}
     with pytest.raises(ValueError, match=r"terms \['goal'\] are nan"):
         ah.evaluate("still", Nan(), episodes=2, drivers=drivers)
-    with pytest.raises(ValueError, match=r"must give two things, \(action, memory\)"):
+    with pytest.raises(ValueError, match=r"must return \(action, memory\)"):
         ah.evaluate(Alone(), Pair(), episodes=2, drivers=drivers)
 
 

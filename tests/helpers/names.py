@@ -13,4 +13,5 @@ def seats(scenario):
 
 def ideal_backends():
     modules = {n: f"marl_airhockey.backends.{n}" for n in ah.backend_names()}
-    return [n for n, m in modules.items() if importlib.import_module(m).make.ideal]
+    made = {n: importlib.import_module(m).make for n, m in modules.items()}
+    return [name for name, kind in made.items() if kind.instant_contacts]

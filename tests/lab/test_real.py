@@ -10,8 +10,9 @@ import pytest
 import marl_airhockey as ah
 from marl_airhockey.core.errors import UnknownKeywordError
 from marl_airhockey.devices.rig import Rig
-from marl_airhockey.evaluation.evaluate import build_driven_world, evaluate
+from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import find_backend, make_agent
+from marl_airhockey.world.build import build_driven_world
 
 
 def keywords(rig, **options):

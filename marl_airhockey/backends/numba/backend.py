@@ -24,7 +24,6 @@ from marl_airhockey.types import Array
 class NumbaBackend(Backend):
     """Backend with B worlds as rows of arrays, stepped by compiled `kernel.advance`."""
 
-    exact: ClassVar[bool] = True
     timestep: ClassVar[float | None] = None
 
     def __init__(

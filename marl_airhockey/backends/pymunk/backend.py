@@ -18,7 +18,6 @@ from marl_airhockey.types import Array
 class PymunkBackend(Backend):
     """Backend with B worlds in plain Python on Chipmunk, the reference for others."""
 
-    exact: ClassVar[bool] = True
     timestep: ClassVar[float | None] = 0.005
 
     def __init__(

@@ -55,10 +55,9 @@ class RealBackend(Backend):
     too long, the paddle brakes and `interruption` says why.
     """
 
-    exact: ClassVar[bool] = False
-    ideal: ClassVar[bool] = False
-    realtime: ClassVar[bool] = True
-    late: ClassVar[bool] = True
+    instant_contacts: ClassVar[bool] = False
+    tracks_commands: ClassVar[bool] = False
+    senses_itself: ClassVar[bool] = True
     timestep: ClassVar[float | None] = None
     cameras: ClassVar[tuple[str, ...]] = ("table", "rectified")
 

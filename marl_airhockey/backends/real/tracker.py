@@ -7,11 +7,11 @@ import time
 import numpy as np
 
 from marl_airhockey.backends.real.events import Track, find_contacts
-from marl_airhockey.core.estimator import Estimator
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.devices.vision import Sighting
+from marl_airhockey.sensing.estimator import Estimator
 from marl_airhockey.types import Array
 
 WAY, PAST = 0.01, 40

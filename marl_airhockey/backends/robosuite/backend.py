@@ -41,8 +41,8 @@ class RobosuiteBackend(Backend):
     holds the motion of the arms at every physics step: see `arrays.TRACE`.
     """
 
-    exact: ClassVar[bool] = True
-    ideal: ClassVar[bool] = False
+    instant_contacts: ClassVar[bool] = False
+    tracks_commands: ClassVar[bool] = False
     timestep: ClassVar[float | None] = 0.001
     cameras: ClassVar[tuple[str, ...]] = ("frontview", "agentview", "birdview")
 

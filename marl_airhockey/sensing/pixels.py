@@ -1,8 +1,7 @@
-"""Pixels that a seat sees."""
+"""Pixel observations: small grey pictures of the table in a seat's ego frame."""
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from marl_airhockey.core.scene import Scene
@@ -20,16 +19,19 @@ def small_picture(
     seat: int,
     size: int,
 ) -> Array:
-    """Draw what a seat sees: (size, size) uint8 grey, ego frame.
+    """Draw the observation of a seat: (size, size) uint8 grey, ego frame.
 
     Args:
-        scene: who is on the table.
-        position: (N, 2) sensed positions, table frame, m.
-        goal: (2,) wanted place, or None.
-        rotation: (2, 2) from the table frame to the seat's ego frame.
-        seat: the seat's index; its own paddle is the brighter one.
-        size: pixels.
+        scene: Bodies on the table.
+        position: Sensed positions (N, 2), table frame, m.
+        goal: Desired position (2,), or None.
+        rotation: Rotation (2, 2) from the table frame to the seat's ego frame.
+        seat: Index of the seat; its own paddle is the brighter one.
+        size: Width and height, pixels.
     """
+    # Here, as everything else in sensing needs no more than numpy and numba.
+    import cv2
+
     image = np.zeros((size, size), np.uint8)
     corners = np.asarray(scene.table.vertices) @ rotation.T
     extent = float(np.abs(corners).max())
@@ -56,14 +58,14 @@ def small_picture(
 def pictures_of(
     scene: Scene, frames: Array, goals: Array | None, seats: Array, size: int
 ) -> Array:
-    """Draw what some seats of W worlds see: (W, seats, size, size, F) uint8.
+    """Draw the observations of some seats of W worlds: (W, seats, size, size, F) uint8.
 
     Args:
-        scene: who is on the table.
-        frames: (W, F, N, 2) sensed positions, table frame, newest last, m.
-        goals: (W, 2) wanted places, or None.
-        seats: (n,) indices of seats.
-        size: pixels.
+        scene: Bodies on the table.
+        frames: Sensed positions (W, F, N, 2), table frame, newest last, m.
+        goals: Desired positions (W, 2), or None.
+        seats: Indices (n,) of seats.
+        size: Width and height, pixels.
     """
     out = np.empty((len(frames), len(seats), size, size, frames.shape[1]), np.uint8)
     for b, world in enumerate(frames):

@@ -6,38 +6,38 @@ import numpy as np
 
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.types import Array
-from marl_airhockey.world.delay import Rows
+from marl_airhockey.types import Array, Rows
 
 SECONDS = 0.1
 """Mean length of an occlusion near an arm (s): half of those measured in play were
 shorter than 17 .. 58 ms, one in ten longer than 92 .. 100."""
 NEAR = 0.25
-"""Distance from an arm within which it may hide a puck (m): all that were measured lay
-so near to the machine, or at the far rail."""
+"""Distance from an arm within which it can hide a puck (m): all measured occlusions
+were within it, or at the far rail."""
 
 
 class Occlusion:
     """Occlusion of the pucks of B worlds.
 
-    An arm reaches from the middle of its seat's side to the paddle. Near one, a puck is
-    hidden and seen in turns, a chain of two states; away from all it is seen.
+    An arm reaches from the middle of its seat's side to the paddle. Near an arm, a puck
+    is hidden and visible by turns, as a Markov chain of two states; elsewhere it is
+    always visible.
 
     Args:
-        scene: its seats have the arms.
-        worlds: B.
-        control_dt: s.
+        scene: Scene whose seats have the arms.
+        worlds: Number of worlds, B.
+        control_dt: Time between two steps, s.
     """
 
     def __init__(self, scene: Scene, worlds: int, control_dt: float) -> None:
-        self._seen = np.ones((worlds, scene.pucks), np.bool_)
+        self._visible = np.ones((worlds, scene.pucks), np.bool_)
         self._end = min(control_dt / SECONDS, 1.0)
         ends = [scene.table.ends(seat.side) for seat in scene.seats]
         self._bases = np.array([(start + end) / 2 for start, end in ends])
 
     def reset(self, worlds: Array) -> None:
-        """Let all pucks be seen in some worlds, by index."""
-        self._seen[worlds] = True
+        """Make all pucks visible in some worlds, by index."""
+        self._visible[worlds] = True
 
     def near(self, pucks: Array, paddles: Array) -> Array:
         """Return (W, pucks) True for pucks (W, pucks, 2) near an arm."""
@@ -47,7 +47,7 @@ class Occlusion:
         gap -= np.clip(share, 0.0, 1.0)[..., None] * along
         return np.asarray((gap * gap).sum(-1).min(-1) < NEAR * NEAR)
 
-    def unhidden(
+    def sample_visible(
         self,
         pucks: Array,
         paddles: Array,
@@ -55,17 +55,17 @@ class Occlusion:
         rng: RandomStreams,
         rows: Rows,
     ) -> Array:
-        """Draw which pucks are seen in some worlds (W,), (W, pucks) bool.
+        """Sample which pucks are visible in some worlds (W,), (W, pucks) bool.
 
         Args:
-            pucks: (W, pucks, 2) m.
-            paddles: (W, seats, 2) m.
-            share: (W,) of the time near an arm in which a puck is hidden.
-            rng: streams of these worlds.
-            rows: which they are.
+            pucks: Positions (W, pucks, 2), m.
+            paddles: Positions (W, seats, 2), m.
+            share: Share (W,) of the time near an arm in which a puck is hidden.
+            rng: Streams of these worlds.
+            rows: Worlds.
         """
         begin = (self._end * share / (1.0 - share))[:, None]
-        luck = rng.uniform(0.0, 1.0, pucks.shape[1])
-        seen = np.where(self._seen[rows], luck >= begin, luck < self._end)
-        self._seen[rows] = seen | ~self.near(pucks, paddles)
-        return np.asarray(self._seen[rows])
+        unit = rng.uniform(0.0, 1.0, pucks.shape[1])
+        visible = np.where(self._visible[rows], unit >= begin, unit < self._end)
+        self._visible[rows] = visible | ~self.near(pucks, paddles)
+        return np.asarray(self._visible[rows])

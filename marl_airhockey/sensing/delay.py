@@ -1,23 +1,19 @@
-"""Delay: values as they were some time ago."""
+"""Delay lines: values of B worlds as they were some time ago."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.types import Array
-
-Rows = Array | slice
-"""Some of the worlds: indices (W,), or all of them."""
-ALL = slice(None)
+from marl_airhockey.types import ALL, Array, Rows
 
 
 class Delay:
     """Delay line of values of B worlds, interpolated between control steps.
 
     Args:
-        longest: the largest delay, s.
-        control_dt: s between two values.
-        shape: (B, ...) of a value.
+        longest: Largest delay, s.
+        control_dt: Time between two values, s.
+        shape: Shape (B, ...) of a value.
     """
 
     def __init__(
@@ -27,28 +23,23 @@ class Delay:
         self.depth = int(np.ceil(longest / control_dt - 1e-9)) + 1
         self._past = np.zeros((shape[0], self.depth, *shape[1:]))
 
-    @property
-    def newest(self) -> Array:
-        """Values (B, ...) that were pushed last, not to be changed."""
-        return self._past[:, -1]
-
     def fill(self, rows: Rows, past: Array | float) -> None:
-        """Begin anew in some worlds with the past (W, depth, ...)."""
+        """Replace the past (W, depth, ...) of some worlds."""
         self._past[rows] = past
 
     def push(self, value: Array, delay: Array, rows: Rows = ALL) -> Array:
-        """Take the newest value (W, ...) and return that of ``delay`` (W,) s ago."""
+        """Append the newest value (W, ...); return that of ``delay`` (W,) s ago."""
         older, newer, share = self._pushed(value, delay, rows)
         return np.asarray(share * newer + (1 - share) * older)
 
     def _pushed(
         self, value: Array, delay: Array, rows: Rows
     ) -> tuple[Array, Array, Array]:
-        """Take the newest value; return those before and after a moment of the past.
+        """Append the newest value; return the two values around a moment of the past.
 
         Returns:
-            Two values (W, ...), and which part of the step between them lies before the
-            moment, (W, 1, ...).
+            The values (W, ...) before and after that moment, and the share of the
+            step between them that lies before it, (W, 1, ...).
         """
         past = np.concatenate([self._past[rows][:, 1:], value[:, None]], axis=1)
         self._past[rows] = past
@@ -61,17 +52,17 @@ class Delay:
         return older, newer, share
 
 
-class WayDelay(Delay):
-    """Delay line of the ways of bodies: straight, with one kink within a step.
+class TrajectoryDelay(Delay):
+    """Delay line of trajectories that are straight but for one kink within a step.
 
-    The kink is where the way before a step and that after it meet, as at a bank or a
-    hit; without one it is in the middle, 0.3 mm off the way that a slope of 0.94 m/s2
-    makes in 50 ms.
+    The kink is where the straight lines before and after a step meet, as at a wall
+    bounce or a hit. Where they are parallel it is in the middle of the step, which is
+    0.3 mm off the trajectory under an acceleration of 0.94 m/s2 in 50 ms.
 
     Args:
-        longest: the largest delay, s.
-        control_dt: s between two motions.
-        shape: (B, bodies) of them.
+        longest: Largest delay, s.
+        control_dt: Time between two samples, s.
+        shape: Shape (B, bodies) of the samples.
     """
 
     def __init__(
@@ -79,9 +70,18 @@ class WayDelay(Delay):
     ) -> None:
         super().__init__(longest, control_dt, (*shape, 4))
 
-    def place(self, motion: Array, delay: Array, rows: Rows = ALL) -> Array:
-        """Take motions (W, bodies, 4) x, y, vx, vy; return places ``delay`` s ago."""
-        older, newer, share = self._pushed(motion, delay, rows)
+    def push_sample(self, sample: Array, delay: Array, rows: Rows = ALL) -> Array:
+        """Append a sample; return the positions of ``delay`` (W,) s ago.
+
+        Args:
+            sample: Positions and velocities (W, bodies, 4): x, y, m, vx, vy, m/s.
+            delay: Delays (W,), s.
+            rows: Worlds of the samples.
+
+        Returns:
+            Positions (W, bodies, 2), m.
+        """
+        older, newer, share = self._pushed(sample, delay, rows)
         dt, before, after = self.control_dt, older[..., 2:], newer[..., 2:]
         change = before - after
         gap = newer[..., :2] - older[..., :2] - after * dt

@@ -6,7 +6,7 @@ from situations import place_puck
 
 import marl_airhockey as ah
 from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.world.calibration import CalibrationMap
+from marl_airhockey.sensing.calibration import CalibrationMap
 
 LEVEL = {"preset": "frictionless", "tilt": 0.0}
 DT = 0.05
@@ -108,7 +108,7 @@ def test_a_calibration_map_is_smooth_and_stays_for_an_episode():
     np.testing.assert_allclose(world.sensed.puck - world.state.puck, shift)
     first = np.arange(500)
     maps = CalibrationMap(500, 0.6)
-    maps.draw(RandomStreams.keyed(first, first, "map"), np.full(500, 0.01), first)
+    maps.sample(RandomStreams.keyed(first, first, "map"), np.full(500, 0.01), first)
     here = np.tile([0.1, -0.2], (500, 1, 1))
     apart = np.array([0.0, 0.01, 0.05, 0.2, 0.6])
     there = [here + np.array([d, 0.0]) for d in apart]
@@ -127,14 +127,15 @@ def test_a_serve_keeps_the_map_of_the_episode():
     state.position[:, 2], state.velocity[:, 2] = (0.80, 0.0), (2.0, 0.0)
     state.position[:, 1] = (0.6, 0.25)
     place = np.zeros((1, 1, 2))
-    before = world.sensor._map.shifted(place, slice(None))
+    before = world.sensor.camera._map.shifted(place, slice(None))
     world.set_state(state, memory)
-    fresh = world.sensor._map.shifted(place, slice(None))
+    fresh = world.sensor.camera._map.shifted(place, slice(None))
     assert (fresh != before).any()
     for _ in range(3):
         world.step(np.zeros((1, 2, 2)))
     assert world.memory["goals"].sum() == 1
-    np.testing.assert_array_equal(world.sensor._map.shifted(place, slice(None)), fresh)
+    kept = world.sensor.camera._map.shifted(place, slice(None))
+    np.testing.assert_array_equal(kept, fresh)
 
 
 def test_a_puck_near_the_arm_is_hidden_for_its_share_of_time():

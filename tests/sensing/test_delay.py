@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from marl_airhockey.world.delay import Delay
+from marl_airhockey.sensing.delay import Delay
 
 DT = 0.05
 

@@ -1,28 +1,27 @@
-"""Calibration map: how far off a camera sees things, by place, for an episode."""
+"""Calibration error: a smooth error of the sensed positions, fixed in an episode."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.types import Array
-from marl_airhockey.world.delay import Rows
+from marl_airhockey.types import Array, Rows
 
 WAVES = 4
-"""Number of waves that a map is the sum of, along x and along y."""
+"""Number of plane waves in a map, for each component."""
 LENGTHS = (0.7, 1.4)
-"""Range of their lengths, in widths of the table: a map that was measured on a real
+"""Range of their wavelengths, in widths of the table; a map that was measured on a real
 table had a period of about one."""
 
 
 class CalibrationMap:
-    """Smooth shift of what is seen in B worlds: a sum of plane waves of any direction.
+    """Map of the calibration error in B worlds: a sum of plane waves of any direction.
 
-    Its standard deviation over places and episodes is that which it is drawn with.
+    Its standard deviation over positions and episodes is the ``sd`` of `sample`.
 
     Args:
-        worlds: B.
-        width: of the table, m.
+        worlds: Number of worlds, B.
+        width: Width of the table, m.
     """
 
     def __init__(self, worlds: int, width: float) -> None:
@@ -32,8 +31,14 @@ class CalibrationMap:
         """Wave numbers along x and y of the waves of both components, rad/m"""
         self._phase, self._height = np.zeros(shape), np.zeros(worlds)
 
-    def draw(self, rng: RandomStreams, sd: Array, worlds: Array) -> None:
-        """Draw the maps of some worlds, by index (W,), with deviations sd (W,)."""
+    def sample(self, rng: RandomStreams, sd: Array, worlds: Array) -> None:
+        """Sample new maps for some worlds, by index (W,).
+
+        Args:
+            rng: Streams of these worlds.
+            sd: Standard deviations (W,), m.
+            worlds: Indices of the worlds.
+        """
         unit = rng.uniform(0.0, 1.0, 3, WAVES, 2)
         low, high = (2.0 * np.pi / (self._width * length) for length in LENGTHS[::-1])
         number = low + (high - low) * unit[:, 0]
@@ -47,9 +52,9 @@ class CalibrationMap:
         )
         self._height[worlds] = sd * np.sqrt(2.0 / WAVES)
 
-    def shifted(self, place: Array, rows: Rows) -> Array:
-        """Return where things (W, n, 2) in some worlds are seen, freshly allocated."""
-        x, y = place[:, :, None, None, 0], place[:, :, None, None, 1]
+    def shifted(self, position: Array, rows: Rows) -> Array:
+        """Return positions (W, n, 2) in some worlds with their error added, m."""
+        x, y = position[:, :, None, None, 0], position[:, :, None, None, 1]
         waves = self._x[rows][:, None] * x + self._y[rows][:, None] * y
         shift = np.cos(waves + self._phase[rows][:, None]).sum(2)
-        return np.asarray(place + self._height[rows][:, None, None] * shift)
+        return np.asarray(position + self._height[rows][:, None, None] * shift)
