@@ -13,7 +13,7 @@ DEAD = 0.12
 class Gamepad(Driver):
     """Driver that commands the stick's velocity, ego frame; full tilt is top speed."""
 
-    led = True
+    needs_person = True
 
     def __init__(self) -> None:
         self.stick = (0.0, 0.0)

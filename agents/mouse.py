@@ -15,7 +15,7 @@ class Mouse(Driver):
         lag: time by which the paddle answers late, see `point_to`, s.
     """
 
-    led = True
+    needs_person = True
 
     def __init__(self, lag: float = 0.0) -> None:
         self._lag = lag

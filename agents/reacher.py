@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ class Reacher(Driver):
         ValueError: a scenario without a goal.
     """
 
+    needs_goal: ClassVar[bool] = True
     gain: float = 4.0
     """Commanded speed per distance (1/s)."""
     run_up: float = 0.22

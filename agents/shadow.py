@@ -42,7 +42,8 @@ class Shadow(Driver):
         ValueError: no rig, or one that cannot be read.
     """
 
-    led = True
+    needs_person = True
+    needs_device = True
 
     def __init__(self, rig: str, prescribe: bool = False, lag: float = ARM_LAG) -> None:
         self._rig = HandRig.load(Path(rig))

@@ -26,7 +26,7 @@ class Ur5e(Driver):
         ValueError: no rig, or one that cannot be read.
     """
 
-    led = True
+    needs_device = True
 
     def __init__(self, rig: str) -> None:
         self._rig = Rig.load(Path(rig))

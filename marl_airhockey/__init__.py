@@ -22,6 +22,7 @@ from marl_airhockey.make import (  # noqa: E402
     make_world,
     parallel_env,
 )
+from marl_airhockey.policies.load import load_policy  # noqa: E402
 from marl_airhockey.registry import (  # noqa: E402
     agent_names,
     backend_names,
@@ -29,7 +30,6 @@ from marl_airhockey.registry import (  # noqa: E402
     make_scenario,
     scenario_names,
 )
-from marl_airhockey.toolkit.policies import load_policy  # noqa: E402
 
 register_all()
 sys.meta_path.append(GameFinder())

@@ -14,8 +14,8 @@ from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult
 from marl_airhockey.evaluation.evaluate import evaluate as evaluate_driver
 from marl_airhockey.evaluation.league import LEAGUE_SEED, play_league
 from marl_airhockey.evaluation.standings import Standings
+from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import find_scenario, make_agent
-from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
@@ -16,8 +17,8 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
-from marl_airhockey.toolkit.players import driver_of
-from marl_airhockey.toolkit.policies import ZOO
+from marl_airhockey.policies.callables import driver_of
+from marl_airhockey.policies.load import ZOO, load_policy
 
 DEFAULT_BACKEND = "numba"
 """Name of the backend that is used unless another is asked for."""
@@ -67,17 +68,23 @@ def agent_names() -> list[str]:
     return _names("agents")
 
 
-def plain_agent_names() -> list[str]:
-    """Return the names of drivers that need no option: no file, no device."""
-    makers = {n: _maker("driver", "agents", "drivers", n) for n in agent_names()}
+def program_names() -> list[str]:
+    """Return the names of drivers that play by themselves: no device, no person."""
+    kinds = {name: agent_class(name) for name in agent_names()}
     return [
         name
-        for name, make in makers.items()
-        if all(
-            p.default is not p.empty
-            for p in inspect.signature(make).parameters.values()
-        )
+        for name, kind in kinds.items()
+        if not (kind.needs_device or kind.needs_person)
     ]
+
+
+def agent_class(name: str) -> type[Driver]:
+    """Return the class of a driver in ``agents/``.
+
+    Raises:
+        ValueError: An unknown name.
+    """
+    return cast(type[Driver], _load("driver", "agents", name, agent_names()).make)
 
 
 def backend_names() -> list[str]:
@@ -98,31 +105,30 @@ def make_scenario(name: str, **options: Any) -> Scenario:
 
 
 def find_scenario(given: str | Scenario | type[Scenario], **options: Any) -> Scenario:
-    """Build the scenario that somebody asks for.
+    """Build a scenario from its name, code, a class or an object.
 
     Args:
-        given: a name; code, ``my_task.py`` or ``package.module:Task``; a class; or a
+        given: Name; code, ``my_task.py`` or ``package.module:Task``; a class; or a
             scenario, which is returned as it is.
-        **options: fields of the scenario.
+        **options: Fields of the scenario.
 
     Raises:
-        ValueError: an unknown name or option, or code that makes no scenario.
+        ValueError: An unknown name or option, or code that makes no scenario.
     """
-    if isinstance(given, Scenario):
-        if options:
-            names = sorted(options)
-            raise ValueError(f"options {names}: give them to the scenario object")
-        return given
-    if isinstance(given, str):
-        if not names_code(given):
-            return make_scenario(given, **options)
+    if not isinstance(given, str):
+        return _scenario(getattr(given, "__name__", repr(given)), given, options)
+    if names_code(given):
         return _scenario(given, load_code(given, Scenario), options)
-    return _scenario(getattr(given, "__name__", repr(given)), given, options)
+    return make_scenario(given, **options)
 
 
 def _scenario(name: str, make: Any, options: Mapping[str, Any]) -> Scenario:
+    """Return a scenario from its class, or the object itself, without options."""
     if isinstance(make, Scenario):
-        return find_scenario(make, **options)
+        if options:
+            names = sorted(options)
+            raise ValueError(f"options {names}: give them to the scenario object")
+        return make
     if not (isinstance(make, type) and issubclass(make, Scenario)):
         raise ValueError(
             f"{name}: {make!r} is no scenario; give a class below Scenario"
@@ -137,46 +143,43 @@ def zoo_names() -> list[str]:
 
 
 def make_agent(player: object, **options: Any) -> Driver:
-    """Build the driver that somebody asks for.
+    """Build a driver from its name, a path, code or an object.
 
     Args:
-        player: the name of a file of ``agents/``, with options behind a colon or not
+        player: Name of a file of ``agents/``, with or without options after a colon
             (``allround:strength=fair,depth=0.05``); of a trained policy that comes with
-            the library (``zoo/duel``); of an installed package's driver; the path of a
+            the library (``zoo/duel``); of an installed package's driver; path of a
             policy's file or run folder; code, ``my_driver.py`` or
-            ``package.module:Class``, with options or not; or an object, see
-            `toolkit.players.driver_of`.
-        **options: besides those in the name.
+            ``package.module:Class``, with or without options; or an object, see
+            `policies.callables.driver_of`.
+        **options: Options in addition to those in the name.
 
     Raises:
-        ValueError: an unknown name or option, or one that makes no sense.
+        ValueError: An unknown name or option, or one that makes no sense.
     """
-    if not isinstance(player, (str, Path)):
-        return _driver(type(player).__name__, player, options)
-    text, path = str(player), Path(player)
-    if isinstance(player, Path):  # A file, whatever its name looks like.
-        return _driver(
-            text,
-            _maker("driver", "agents", "drivers", "policy"),
-            {**options, "path": path},
-        )
-    short, _, given = text.partition(":")
-    if short in {*agent_names(), *plugins("drivers")} or short.startswith("zoo/"):
-        options = _options(given) | options
-        if short.startswith("zoo/"):
-            if short not in zoo_names():
-                raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
-            if "path" in options:
-                raise ValueError(f"{text}: the path of a policy of the zoo is known")
-            short, options["path"] = "policy", ZOO / f"{short[4:]}.npz"
-        make = _maker("driver", "agents", "drivers", short)
-        return _driver(short, make, options)
-    code, given = _split(text)
+    if isinstance(player, (str, Path)):
+        name, make, more = _named(player)
+        return _driver(name, make, {**more, **options})
+    return _driver(type(player).__name__, player, options)
+
+
+def _named(given: str | Path) -> tuple[str, Any, dict[str, Any]]:
+    """Return the name of a driver, what makes it, and the options in its name."""
+    text, path = str(given), Path(given)
+    if isinstance(given, Path):  # A file, whatever its name looks like.
+        return text, partial(_load_file, path), {}
+    short, _, tail = text.partition(":")
+    if short.startswith("zoo/"):
+        if short not in zoo_names():
+            raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
+        return short, partial(_load_file, ZOO / f"{short[4:]}.npz"), _options(tail)
+    if short in {*agent_names(), *plugins("drivers")}:
+        return short, _maker("driver", "agents", "drivers", short), _options(tail)
+    code, tail = _split(text)
     if names_code(code):
-        options = _options(given) | options
-        return _driver(code, load_code(code, Driver), options)
+        return code, load_code(code, Driver), _options(tail)
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
-        return make_agent(path, **options)
+        return text, partial(_load_file, path), {}
     names = [*agent_names(), *plugin_names("drivers")]
     raise ValueError(
         unknown_name("driver", text, names)
@@ -184,21 +187,27 @@ def make_agent(player: object, **options: Any) -> Driver:
     )
 
 
-def _driver(name: str, player: Any, options: Mapping[str, Any]) -> Driver:
-    """Return a driver from what makes one, or from a player of any kind."""
-    makes = isinstance(player, type) and issubclass(player, Driver)
-    if makes or (inspect.isfunction(player) and player.__name__ == "make"):
-        parameters = inspect.signature(player).parameters
+def _load_file(path: Path, deterministic: bool = True) -> Driver:
+    """Load a policy. Trust in its code is no option: names come from files, too."""
+    return load_policy(path, bool(deterministic))
+
+
+def _driver(name: str, given: Any, options: Mapping[str, Any]) -> Driver:
+    """Return a driver from a function or class that makes one, or from an object."""
+    own_class = isinstance(given, type) and issubclass(given, Driver)
+    named_make = inspect.isfunction(given) and given.__name__ == "make"
+    if own_class or named_make or isinstance(given, partial):
+        parameters = inspect.signature(given).parameters
         for option, value in options.items():
             numeric = option in parameters and parameters[option].annotation == "float"
             if numeric and not isinstance(value, (int, float)):
                 raise ValueError(
                     f"option {option!r} of {name}: expected a number, got {value!r}"
                 )
-        player = _build(f"option of {name}", player, options, list(parameters))
+        given = _build(f"option of {name}", given, options, list(parameters))
     elif options:
         raise ValueError(f"options {sorted(options)}: {name} takes none")
-    return driver_of(player)
+    return driver_of(given)
 
 
 def _split(text: str) -> tuple[str, str]:

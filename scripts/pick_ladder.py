@@ -24,7 +24,7 @@ from rich.table import Table
 from marl_airhockey.evaluation.league import play_league
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.learn.export import export_policy
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.policies.load import load_policy
 
 WANTED, WITHIN = 0.75, (0.65, 0.85)
 """Score of a rung against the one below: nearest to the first, inside the second"""

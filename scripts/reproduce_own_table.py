@@ -43,7 +43,7 @@ from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.world import LabWorld
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.policies.load import load_policy
 from marl_airhockey.world.build import Keywords, build_driven_world
 
 OPTIONS = {"table": LabSetup().table}

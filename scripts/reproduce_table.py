@@ -31,7 +31,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
 from marl_airhockey.learn.train import train
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.policies.load import load_policy
 
 PAPER = {
     "reach": (0.9, 1.0, 1.0),

@@ -38,8 +38,8 @@ from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, preset
 from marl_airhockey.learn.plots import plot_seed_curves
 from marl_airhockey.learn.train import train
+from marl_airhockey.policies.load import load_policy
 from marl_airhockey.sensing.simulated_camera import SENSED
-from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
 PAPER = {

@@ -29,8 +29,8 @@ from ray.tune.registry import register_env
 import marl_airhockey as ah
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.rllib import start_ray
+from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.policies import Policy
 
 
 def make_duel(_: Any) -> ParallelPettingZooEnv:

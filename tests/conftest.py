@@ -10,7 +10,7 @@ from names import GOALS, ideal_backends, seats
 from xdist.scheduler import LoadScopeScheduling
 
 import marl_airhockey as ah
-from marl_airhockey.registry import plain_agent_names
+from marl_airhockey.registry import agent_class
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("MUJOCO_GL", "egl")
@@ -61,7 +61,9 @@ def pytest_generate_tests(metafunc):
         "scenario": ah.scenario_names,
         "single": lambda: [n for n in ah.scenario_names() if seats(n) == 1],
         "backend": ideal_backends,
-        "agent": plain_agent_names,
+        "agent": lambda: [
+            n for n in ah.agent_names() if not agent_class(n).needs_device
+        ],
         "goal_scenario": lambda: GOALS,
     }
     names = [name for name in found if name in metafunc.fixturenames]

@@ -22,7 +22,7 @@ assert env.reset(seed=0)[0].shape == env.observation_space.shape
 with_a_mate = ah.parallel_env("rally", drivers={"paddle_1": "zoo/rally"})
 with_a_mate.reset(seed=0)
 with_a_mate.step({"paddle_0": np.zeros(2, np.float32)})
-for driver in registry.plain_agent_names():
+for driver in registry.program_names():
     ah.make_agent(driver)
 with contextlib.suppress(RuntimeError):
     ah.make_sb3_vec("juggle")

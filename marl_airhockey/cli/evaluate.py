@@ -37,8 +37,8 @@ from marl_airhockey.cli.real_table import (
 )
 from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
 from marl_airhockey.evaluation.over_runs import OverRuns
+from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
-from marl_airhockey.toolkit.policies import Policy
 
 FLOORS = ("still", "random", "sticky")
 """Drivers without skill that results are compared with."""

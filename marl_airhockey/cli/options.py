@@ -18,7 +18,7 @@ from marl_airhockey.evaluation.as_trained import (
     seen_in,
 )
 from marl_airhockey.jit.threads import use_threads
-from marl_airhockey.toolkit.trust import Trust
+from marl_airhockey.policies.trust import Trust
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:

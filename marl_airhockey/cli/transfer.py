@@ -26,8 +26,8 @@ from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.profiles import PROFILES, find_profile
 from marl_airhockey.core.table import TABLES
+from marl_airhockey.policies.trust import require_trust
 from marl_airhockey.registry import find_backend, find_scenario, make_agent
-from marl_airhockey.toolkit.trust import require_trust
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:

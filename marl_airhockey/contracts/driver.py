@@ -69,8 +69,12 @@ class Driver:
     """s between two decisions, a multiple of the environment's; None for the same."""
     erratic: ClassVar[bool] = False
     """True for one that must never move a real arm."""
-    led: ClassVar[bool] = False
-    """True for one that a person leads: handicaps of programs are not for it."""
+    needs_person: ClassVar[bool] = False
+    """True for one that a person moves, with a mouse, a gamepad or a hand."""
+    needs_device: ClassVar[bool] = False
+    """True for one that owns a device: a camera, a robot."""
+    needs_goal: ClassVar[bool] = False
+    """True for one that can only play a `GoalScenario`."""
 
     @property
     def trouble(self) -> str:

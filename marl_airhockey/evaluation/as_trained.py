@@ -9,9 +9,9 @@ from typing import Any, cast
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.policies.policy import Policy
+from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import find_scenario, runs_code
-from marl_airhockey.toolkit.policies import Policy
-from marl_airhockey.toolkit.trust import is_trusted_code, require_trust
 from marl_airhockey.world.build import Keywords
 
 EVERYWHERE = ("profile", "control_dt", "goals")

@@ -14,8 +14,8 @@ from marl_airhockey.evaluation.card import Card, Result
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.policies.load import ZOO
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.policies import ZOO
 
 TASKS = (
     "reach",

@@ -12,7 +12,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
-from marl_airhockey.toolkit.policies import policies_of
+from marl_airhockey.policies.runs import policies_of
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 

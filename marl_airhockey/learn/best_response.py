@@ -8,8 +8,8 @@ from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.config import load_config, preset
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import train
+from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.policies import load_policy
 from marl_airhockey.world.build import Keywords
 
 GAMES = 400

@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.profiles import SUFFIX, find_profile
 from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.policies.runs import check_run_format
+from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import find_scenario, runs_code
-from marl_airhockey.toolkit.policies import check_run_format
-from marl_airhockey.toolkit.trust import is_trusted_code, require_trust
 from marl_airhockey.world.build import Keywords
 
 OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")

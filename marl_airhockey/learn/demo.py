@@ -14,8 +14,8 @@ from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.plots import plot_learning_curve
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import train, versions
+from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.policies import load_policy
 
 BESIDE = ("still", "random", "striker")
 """Agents that the learned policy is compared with"""

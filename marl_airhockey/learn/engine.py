@@ -20,9 +20,9 @@ from marl_airhockey.learn.grade import Metrics, grade
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.self_play import SelfPlayVecEnv
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import find_backend
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import policy_driver
 from marl_airhockey.world.build import compile_world
 
 

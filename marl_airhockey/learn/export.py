@@ -15,9 +15,9 @@ from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.config import TrainConfig, load_config, preset
 from marl_airhockey.learn.run import Progress
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.registry import find_scenario, make_agent
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import Policy, policy_driver, trained_in
 
 EPISODES = 1000
 """Episodes by which a task's policy is measured"""

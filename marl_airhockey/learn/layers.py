@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 
 def linear_layers(widths: Sequence[int], gain: float) -> nn.Sequential:

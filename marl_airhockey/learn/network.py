@@ -12,13 +12,10 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 from marl_airhockey.learn.run_config import RunConfig
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import (
-    RUN_FORMAT,
-    numpy_actor,
-    scaled_policy,
-    trained_in,
-)
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import trained_in
+from marl_airhockey.policies.runs import RUN_FORMAT
+from marl_airhockey.policies.sb3 import numpy_actor, scaled_policy
 
 
 class FixedScale(BaseFeaturesExtractor):

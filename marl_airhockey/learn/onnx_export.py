@@ -9,8 +9,8 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import ONNX_CARD
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.onnx import ONNX_CARD
 
 OPSET = 17
 """Version of the operators, which runtimes from 2022 on know"""

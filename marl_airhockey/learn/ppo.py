@@ -31,7 +31,7 @@ from marl_airhockey.learn.layers import linear_layers, plain_policy
 from marl_airhockey.learn.network import policy_card
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""

@@ -26,8 +26,8 @@ from marl_airhockey.learn.network import policy_card
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU, ActorCritic, BatchRunner
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import make_training_env
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import policy_driver
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import policy_driver
 
 
 def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:

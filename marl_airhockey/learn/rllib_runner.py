@@ -20,7 +20,7 @@ from ray.rllib.env.utils.infinite_lookback_buffer import InfiniteLookbackBuffer
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.network import FixedScale, layers_to_numpy
 from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.types import Array
 
 RUNNER_CPU = "runner_cpu_seconds"

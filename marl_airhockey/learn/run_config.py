@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar
 
+from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.registry import DEFAULT_BACKEND
-from marl_airhockey.toolkit.policies import RUN_FORMAT
 from marl_airhockey.world.build import Keywords
 
 

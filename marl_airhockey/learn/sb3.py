@@ -20,7 +20,7 @@ from marl_airhockey.learn.network import FixedScale, policy_card
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.sb3_callback import TrainingCallback
 from marl_airhockey.learn.self_play import make_training_env
-from marl_airhockey.toolkit.policies import load_weights
+from marl_airhockey.policies.sb3 import load_weights
 
 
 def train_with_sb3(run: TrainingRun[TrainConfig]) -> Metrics:

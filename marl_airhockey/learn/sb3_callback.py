@@ -15,8 +15,8 @@ from marl_airhockey.learn.grade import Metrics, grade
 from marl_airhockey.learn.network import to_numpy
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayVecEnv
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import Policy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import Policy
 
 
 class TrainingCallback(BaseCallback):

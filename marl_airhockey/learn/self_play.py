@@ -13,9 +13,9 @@ from marl_airhockey.evaluation.games import teams_of
 from marl_airhockey.learn.action_penalty import ActionPenalty
 from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.make import make_sb3_vec
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import policy_driver
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.roster import Roster

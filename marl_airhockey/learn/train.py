@@ -21,8 +21,8 @@ from marl_airhockey.learn.grade import Metrics
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
+from marl_airhockey.policies.trust import trust_code
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.trust import trust_code
 
 
 def train(

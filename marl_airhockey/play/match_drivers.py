@@ -8,16 +8,17 @@ from functools import cached_property
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.play.handicap import Handicap
+from marl_airhockey.policies.load import ZOO
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import (
     make_agent,
     make_scenario,
-    plain_agent_names,
+    program_names,
     zoo_names,
 )
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
 from marl_airhockey.toolkit.pointing import ARM_LAG
-from marl_airhockey.toolkit.policies import ZOO
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import refuse_erratic
 from marl_airhockey.world.driven_seat import DrivenSeat
@@ -25,8 +26,6 @@ from marl_airhockey.world.world import World
 
 PERSON = "person"
 """Name of the driver of a seat that people take."""
-INPUT_DEVICES = ("mouse", "gamepad")
-"""Names of the drivers by which people steer."""
 
 
 class MatchDrivers:
@@ -52,10 +51,14 @@ class MatchDrivers:
     @property
     def choices(self) -> list[str]:
         """Names of programs to choose from: fitting policies, then scripts."""
-        hidden = (*INPUT_DEVICES, "reacher")
-        scripts = [name for name in plain_agent_names() if name not in hidden]
-        if self._world.backend.senses_itself:
-            scripts = [name for name in scripts if not make_agent(name).erratic]
+        programs = {name: make_agent(name) for name in program_names()}
+        goal = isinstance(self._world.scenario, GoalScenario)
+        real = self._world.backend.senses_itself
+        scripts = [
+            name
+            for name, driver in programs.items()
+            if (goal or not driver.needs_goal) and not (real and driver.erratic)
+        ]
         if len(self.names) > 1:
             scripts += [
                 f"{name}:strength={strength}"
@@ -91,8 +94,6 @@ class MatchDrivers:
         Raises:
             ValueError: an unknown name, or a policy that does not fit.
         """
-        if name in INPUT_DEVICES:
-            raise ValueError(f"{name} is a person's input device: say {PERSON}")
         old_name, old = self.names[i], self._driven[i]
         self.names[i] = name
         try:
@@ -162,6 +163,9 @@ class MatchDrivers:
         driver = self._devices[i]
         if name != PERSON:
             driver = make_agent(name)
+            if driver.needs_person and not driver.needs_device:
+                raise ValueError(f"{name} is a person's input device: say {PERSON}")
             refuse_erratic(f"paddle_{i}", driver, world.backend)
-            driver = driver if driver.led else self.handicap.apply(driver)
+            if not (driver.needs_person or driver.needs_device):
+                driver = self.handicap.apply(driver)
         return DrivenSeat(i, driver, world.observer, 1, world.control_dt)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
+from marl_airhockey.policies.trust import Trust
 from marl_airhockey.study.plan import Opponent, Plan
-from marl_airhockey.toolkit.trust import Trust
 
 
 def open_match(plan: Plan) -> LiveMatch:

@@ -11,7 +11,7 @@ from command import airhockey
 
 import marl_airhockey as ah
 from marl_airhockey.envs.meanings import term_meanings
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.policies.load import load_policy
 
 
 def process(*words, ok=True, cwd=None):

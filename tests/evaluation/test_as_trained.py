@@ -9,8 +9,8 @@ from runs import SMALL
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.as_trained import as_trained, describe_environment
+from marl_airhockey.policies.load import ZOO, load_policy
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.policies import ZOO, load_policy
 
 GENTLE = """
 from dataclasses import dataclass

@@ -6,7 +6,7 @@ import sys
 from typing import NamedTuple
 
 from marl_airhockey.cli.main import main
-from marl_airhockey.toolkit.trust import Trust
+from marl_airhockey.policies.trust import Trust
 
 
 class Done(NamedTuple):

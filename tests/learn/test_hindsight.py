@@ -14,7 +14,7 @@ from marl_airhockey.learn.hindsight.config import hindsight_config
 from marl_airhockey.learn.hindsight.sac import Evaluations, build_model
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.train import load_any_config, train
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.policies.load import load_policy
 
 SMALL = {
     "num_worlds": 4,

@@ -17,7 +17,8 @@ from marl_airhockey.learn.best_response import best_response
 from marl_airhockey.learn.config import TrainConfig, preset
 from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.train import train
-from marl_airhockey.toolkit.policies import RUN_FORMAT, load_policy
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.transfer.measure import fine_tuning_config
 
 

@@ -8,7 +8,7 @@ from marl_airhockey.evaluation.league import find_policies
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.learn.train import train
-from marl_airhockey.toolkit.policies import load_policy
+from marl_airhockey.policies.load import load_policy
 
 GAME = {**SMALL, "num_worlds": 32, "batch_size": 256, "n_steps": 16, "snapshots": 4}
 GAME |= {"options": {"seconds": 3.0}, "eval_episodes": 4, "pool": 2, "mirror": 0.5}

@@ -9,9 +9,9 @@ import pytest
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
+from marl_airhockey.policies.load import ZOO
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import make_agent, zoo_names
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import ZOO
 
 # The lower levels of a game's ladder differ from its strongest by numbers alone.
 # Policies of other profiles and tables are measured in the same way.

@@ -7,8 +7,8 @@ import pytest
 from marl_airhockey.cli.main import app
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.train import train
+from marl_airhockey.policies.trust import Trust
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.trust import Trust
 from marl_airhockey.transfer.measure import (
     fine_tuning_config,
     measure_transfer,

@@ -25,7 +25,7 @@ from marl_airhockey.learn.grade import Metrics
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.network import FixedScale, layers_to_numpy, policy_card
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 REPORT = 100
 """Steps of all worlds from one report of progress to the next"""

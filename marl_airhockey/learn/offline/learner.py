@@ -22,7 +22,7 @@ from marl_airhockey.learn.offline.actor import Algorithm
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.world.build import build_world
 
 REPORT = 500

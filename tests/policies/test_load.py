@@ -10,9 +10,10 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.sb3 import build_model
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import RUN_FORMAT, load_policy
 
 
 def test_a_policy_plays_the_same_deterministically_and_samples_otherwise(touch_run):

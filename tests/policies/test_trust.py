@@ -11,10 +11,10 @@ from stable_baselines3 import PPO
 import marl_airhockey as ah
 from marl_airhockey.evaluation.league import find_policies
 from marl_airhockey.learn.config import load_config
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.trust import Trust
 from marl_airhockey.registry import make_agent
-from marl_airhockey.toolkit.numpy_policy import NumpyPolicy
-from marl_airhockey.toolkit.policies import load_policy
-from marl_airhockey.toolkit.trust import Trust
 
 
 class Trap:
@@ -163,9 +163,11 @@ def test_broken_and_disguised_arrays_are_refused(tmp_path):
 
 def test_names_cannot_say_that_they_are_trusted(trap):
     path, sprung = trap
-    for name in (f"policy:path={path},trust=yes", f"policy:path={path}"):
-        with pytest.raises(ValueError, match=r"unknown option|pickled Python"):
+    for name in (f"{path}:trust=yes", f"zoo/juggle:path={path}", str(path)):
+        with pytest.raises(ValueError, match=r"unknown|pickled Python"):
             make_agent(name)
+    with pytest.raises(ValueError, match=r"unknown option .*'trust'"):
+        make_agent(path, trust=True)
     assert not sprung.exists()
 
 
@@ -174,7 +176,7 @@ def test_a_file_is_a_file_whatever_its_name_looks_like(trap, tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "evil.py").write_text(f"open({str(sprung)!r}, 'w')")
-    for name in ("evil.py:x.npz", f"policy:path={path.name},trust=1,a=.npz"):
+    for name in ("evil.py:x.npz", f"still:path={path.name},trust=1,a=.npz"):
         written(folder / name)
     players = [make_agent(found) for found in find_policies(folder)]
     assert [player.shape for player in players] == [(8,), (8,)]

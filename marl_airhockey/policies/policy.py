@@ -1,0 +1,110 @@
+"""Policy: a learned policy as a driver, and the environment of its training."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.driver import Driver, View
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.types import Array
+
+Predict = Callable[[Any, bool], Array]
+"""Function of observations (B, ...) and whether to return mean actions."""
+
+
+@dataclass
+class Policy(Driver):
+    """Learned policy as a driver.
+
+    Outside of environments, ``predict`` is the policy itself: it takes observations
+    (B, D) as the environment of its training gives them, and whether to return the mean
+    action, and returns actions (B, 2), fractions of top speed in the ego frame. They
+    may lie a little beyond -1 .. 1, where environments clip them.
+
+    Args:
+        predict: function (observation (B, ...), deterministic) -> action (B, 2).
+        shape: of the observation that it was trained on; None if unknown.
+        observe: form of that observation; None for the environment's.
+        source: origin of the policy, for messages.
+        deterministic: return the mean action instead of a sample.
+    """
+
+    predict: Predict
+    shape: tuple[int, ...] | None = None
+    observe: str | None = None
+    source: str = "policy"
+    deterministic: bool = True
+    noise: Array | None = None
+    """Standard deviation of sampled actions (2,), if `predict` returns only means"""
+    can_sample: bool = True
+    """False if it has a mean action alone, as ONNX models"""
+    trained_in: Mapping[str, Any] = field(default_factory=dict)
+    """Environment of its training, as far as it is known, see `trained_in`"""
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        action = self._actions(view.observation)
+        if self.noise is not None and not self.deterministic:
+            action += self.noise * view.rng.normal(2)
+        return np.clip(action, -1.0, 1.0), memory
+
+    def check(self, observation: Array | Mapping[str, Array]) -> None:
+        if isinstance(observation, Mapping):
+            shape: tuple[int, ...] = (sum(x.shape[1] for x in observation.values()),)
+        else:
+            shape = observation.shape[1:]
+        if self.shape not in (None, shape):
+            raise ValueError(
+                f"{self.source}: it expects observations of shape {self.shape}, "
+                f"this environment gives {shape}; it was trained on another "
+                "scenario, or with other options (observe, goals, reaction, seats)"
+            )
+
+    def _actions(self, observation: Any) -> Array:
+        return np.asarray(self.predict(observation, self.deterministic), np.float64)
+
+
+TRAINED_IN: dict[str, type | tuple[type, ...]] = {
+    "scenario": str,
+    "profile": str,
+    "options": dict,
+    "physics": dict,
+    "drivers": dict,
+    "control_dt": (int, float),
+    "goals": str,
+}
+"""What describes the environment of a training, and its types"""
+
+
+def trained_in(card: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a policy's card or a run's settings say of its environment.
+
+    Returns:
+        The scenario's name, and keywords of environments; without what is not there or
+        is of another type, as files come from anywhere.
+    """
+    return {
+        name: card[name]
+        for name, kind in TRAINED_IN.items()
+        if isinstance(card.get(name), kind)
+    }
+
+
+def policy_driver(
+    policy: NumpyPolicy, source: str, deterministic: bool = True
+) -> Policy:
+    """Return a NumPy policy as a driver."""
+    return Policy(
+        policy,
+        policy.centre.shape,
+        policy.card.get("observe"),
+        source,
+        deterministic,
+        np.exp(policy.log_std),
+        trained_in=trained_in(policy.card),
+    )

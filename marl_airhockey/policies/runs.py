@@ -1,0 +1,45 @@
+"""Runs of training: the files of their policies, their format and settings."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from marl_airhockey.policies.policy import trained_in
+
+RUN_FORMAT = 2
+"""Format of a run's folder, in its ``config.toml`` and in the card of its zips.
+
+Raised whenever classes that a run pickles, or settings that it names, move: runs of
+another format are refused.
+"""
+KINDS = ("npz", "zip")
+"""File name extensions of the policies that engines write, the harmless one first."""
+
+
+def policies_of(run: Path) -> list[Path]:
+    """Return the paths that a run's policies may have, the one to take first."""
+    return [run / f"{name}.{kind}" for kind in KINDS for name in ("best", "last")]
+
+
+def check_run_format(source: Path, found: int) -> None:
+    """Refuse a run of another format than `RUN_FORMAT`.
+
+    Raises:
+        ValueError: another format.
+    """
+    if found != RUN_FORMAT:
+        raise ValueError(
+            f"{source}: this run was begun by another version of marl_airhockey (run "
+            f"format {found}, this version reads {RUN_FORMAT}); train it anew in "
+            "another folder"
+        )
+
+
+def run_settings(folder: Path) -> dict[str, Any]:
+    """Return what the settings in a run's folder say of its environment, if any."""
+    try:
+        return trained_in(tomllib.loads((folder / "config.toml").read_text()))
+    except (OSError, ValueError):
+        return {}

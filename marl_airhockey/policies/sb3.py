@@ -1,0 +1,156 @@
+"""Models of stable-baselines3 as policies; those of our training as plain weights."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.core.errors import require
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
+from marl_airhockey.policies.runs import check_run_format
+from marl_airhockey.policies.trust import require_trust
+from marl_airhockey.types import Array
+
+
+def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
+    """Load a zip of stable-baselines3 as a policy.
+
+    A zip of our training on numbers is read as plain weights; any other one holds
+    pickled Python, which runs if it is trusted, see `trust.require_trust`.
+
+    Raises:
+        ValueError: Another kind of file or model, or one that is not trusted.
+        RuntimeError: stable-baselines3 is missing; says how to install it.
+    """
+    require("stable_baselines3", "train")
+    wrong = f"{path}: not a stable-baselines3 policy"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            data = json.loads(archive.read("data"))
+        module = data["policy_class"]["__module__"]
+    except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{wrong} ({error})") from error
+    if "card" in data:  # of our own training
+        check_run_format(path, data["card"].get("run_format", 1))
+        if data["card"].get("observe") != "pixels":
+            own = numpy_actor(load_weights(path), data["card"])
+            return policy_driver(own, str(path), deterministic)
+    require_trust(path, trust)
+    import stable_baselines3 as sb3
+
+    families: dict[str, Any] = {"sac": sb3.SAC, "td3": sb3.TD3, "common": sb3.PPO}
+    kinds = [kind for name, kind in families.items() if f".{name}." in module]
+    if not kinds:
+        raise ValueError(f"{wrong} of PPO, A2C, SAC, TD3 or DDPG (found {module})")
+    try:
+        # Training schedules are dropped: a policy does not need them.
+        plain = {"lr_schedule": lambda _: 0.0, "clip_range": lambda _: 0.0}
+        model = kinds[0].load(path, device="cpu", custom_objects=plain)
+    except Exception as error:
+        raise ValueError(f"{wrong}: {error}") from error
+    if model.action_space.shape != (2,):
+        raise ValueError(f"{path}: its action space is {model.action_space}, not (2,)")
+    card = getattr(model, "card", {})
+
+    return Policy(
+        partial(_predict_sb3, model.policy),
+        model.observation_space.shape,
+        card.get("observe"),
+        str(path),
+        deterministic,
+        trained_in=model_environment(model),
+    )
+
+
+def model_environment(model: Any) -> dict[str, Any]:
+    """Return what a model says of the environment of its training, see `trained_in`.
+
+    Args:
+        model: of stable-baselines3, or anything else with a ``card`` or an
+            ``observation_space``.
+    """
+    card = getattr(model, "card", None)
+    known = trained_in(card if isinstance(card, Mapping) else {})
+    spaces = getattr(getattr(model, "observation_space", None), "spaces", None)
+    if isinstance(spaces, Mapping) and "desired_goal" in spaces:
+        return {**known, "goals": "dict"}
+    return known
+
+
+def _predict_sb3(policy: Any, observation: Any, deterministic: bool) -> Array:
+    return np.asarray(policy.predict(observation, deterministic=deterministic)[0])
+
+
+def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPolicy:
+    """Return the actor of a model of our training as plain arrays.
+
+    Args:
+        weights: tensors by their names in the model's policy.
+        card: description of the policy.
+
+    Raises:
+        ValueError: another kind of model: pixels, other layers.
+    """
+    layers = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(weights))]
+    layers = [*(name for name in layers if f"{name}.weight" in weights), "action_net"]
+    try:
+
+        def array(name: str) -> Array:
+            return np.array(weights[name].detach().cpu().numpy(), np.float32)
+
+        centre, rate = (array(f"features_extractor.{n}") for n in ("centre", "rate"))
+        pairs = [(array(f"{n}.weight"), array(f"{n}.bias")) for n in layers]
+        log_std = array("log_std")
+    except KeyError as error:
+        raise ValueError(
+            f"no .npz holds this policy (it has no {error}): only those on flat "
+            "observations or goals, with ReLU layers"
+        ) from error
+    return scaled_policy(pairs, centre, 1.0 / rate, log_std, card)
+
+
+def scaled_policy(
+    layers: Sequence[tuple[Array, Array]],
+    centre: Array,
+    unit: Array,
+    log_std: Array,
+    card: Mapping[str, Any],
+) -> NumpyPolicy:
+    """Return a policy whose goals, if it has some, follow the flat part as they are.
+
+    Args:
+        layers: see `NumpyPolicy`.
+        centre: (D,) of the flat part.
+        unit: (D,) of the flat part.
+        log_std: see `NumpyPolicy`.
+        card: see `NumpyPolicy`.
+    """
+    goals = (0, layers[0][0].shape[1] - len(centre))
+    unit = np.pad(unit, goals, constant_values=1.0)
+    return NumpyPolicy(layers, np.pad(centre, goals), unit, log_std, card)
+
+
+def load_weights(path: Path) -> Mapping[str, Any]:
+    """Read the tensors of a zip of stable-baselines3, running nothing in it.
+
+    Raises:
+        ValueError: a zip that holds something else.
+    """
+    import torch
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            content = io.BytesIO(archive.read("policy.pth"))
+        found = torch.load(content, map_location="cpu", weights_only=True)
+        return dict(found)
+    except Exception as error:  # Whatever a broken or hostile file makes of it.
+        kind = type(error).__name__
+        raise ValueError(f"{path}: it holds no plain weights ({kind})") from error
