@@ -117,7 +117,7 @@ def train(
             from recordings.
         data: files of recordings and folders of them, for those.
         report: called with steps done, steps in all and the latest evaluation.
-        **settings: changes of the preset, see `learn.config.TrainConfig`,
+        **settings: changes of the preset, see `learn.ppo_config.PPOConfig`,
             `learn.hindsight.config.HindsightConfig` and
             `learn.offline.config.OfflineConfig`: `total_steps`, `seed`, `profile`,
             `observe`, `options`, `drivers` and so on.

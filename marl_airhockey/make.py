@@ -89,15 +89,26 @@ def make_vec(
 
 
 def make_sb3_vec(
-    scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
+    scenario: str | Scenario,
+    num_worlds: int = 1,
+    render_mode: str | None = None,
+    **keywords: Unpack[Keywords],
 ) -> AirHockeyVecEnv:
-    """Build a stable-baselines3 VecEnv of num_worlds x open seats."""
+    """Build a stable-baselines3 VecEnv of num_worlds x open seats.
+
+    Args:
+        scenario: Name of the scenario, or a scenario object.
+        num_worlds: Number of worlds, B.
+        render_mode: None or "rgb_array": pictures of all worlds, tiled.
+        **keywords: See `build.build_world`.
+    """
     from marl_airhockey.core.errors import require
 
     require("stable_baselines3", "train")
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+    from marl_airhockey.envs.slots import SlotEnv
 
-    return AirHockeyVecEnv(scenario, num_worlds, **keywords)
+    return AirHockeyVecEnv(SlotEnv(scenario, num_worlds, **keywords), render_mode)
 
 
 def make_torchrl(

@@ -18,7 +18,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import train
 
 ENGINES = "torch", "sb3"

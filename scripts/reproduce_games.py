@@ -28,7 +28,8 @@ from marl_airhockey.evaluation.charts import DPI, INK, INKS, plot_iqm, save, tid
 from marl_airhockey.evaluation.crossplay import play_together
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.config import OPPONENTS, preset
+from marl_airhockey.learn.ppo_config import preset
+from marl_airhockey.learn.self_play_config import OPPONENTS
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent

@@ -41,7 +41,7 @@ from marl_airhockey.evaluation.evaluate import (
 )
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.world import LabWorld
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.world.build import Keywords, build_driven_world

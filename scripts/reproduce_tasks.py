@@ -35,8 +35,8 @@ from rich.table import Table
 from marl_airhockey import make_agent
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.config import TrainConfig, preset
 from marl_airhockey.learn.plots import plot_seed_curves
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.sensing.simulated_camera import SENSED
@@ -84,7 +84,7 @@ Row = dict[str, Any]
 Rows = list[Row]
 
 
-def config_of(task: str, profile: str, variant: str, seed: int) -> TrainConfig:
+def config_of(task: str, profile: str, variant: str, seed: int) -> PPOConfig:
     """Return the preset of a task in a profile, with what a variant changes."""
     changes = {"profile": profile, "seed": seed, **VARIANTS[variant]}
     if variant == "truth":  # Nothing is sensed, so the preset is that of ideal.
@@ -92,7 +92,7 @@ def config_of(task: str, profile: str, variant: str, seed: int) -> TrainConfig:
     return preset(task, changes)
 
 
-def recipe(config: TrainConfig) -> str:
+def recipe(config: PPOConfig) -> str:
     """Return a short name of all settings but the seed.
 
     Those at their defaults are left out, so that neither another setting nor another
@@ -112,7 +112,7 @@ def _default(field: dataclasses.Field[Any]) -> Any:
     return field.default if factory is dataclasses.MISSING else factory()
 
 
-def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Rows]:
+def train_seed(config: PPOConfig, variant: str, folder: Path) -> tuple[Row, Rows]:
     """Train one seed, measure its last policy; return its row and those of its curve.
 
     Args:
@@ -138,7 +138,7 @@ def train_seed(config: TrainConfig, variant: str, folder: Path) -> tuple[Row, Ro
     return row, [{**key, **point} for point in points]
 
 
-def measure(config: TrainConfig, folder: Path) -> Row:
+def measure(config: PPOConfig, folder: Path) -> Row:
     """Return the success of a run's last policy in all cases, by the column's name."""
     usual = config.keywords
     late: Keywords = {

@@ -112,7 +112,7 @@ def touch_run(tmp_path_factory):
     """The folder of a run that has learned to touch the puck."""
     from runs import SMALL
 
-    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.ppo_config import preset
     from marl_airhockey.learn.train import train
 
     folder = tmp_path_factory.mktemp("run") / "touch-0"
@@ -145,7 +145,7 @@ def sb3_run(tmp_path_factory):
     """The folder of a short run of the engine sb3."""
     from runs import SMALL
 
-    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.ppo_config import preset
     from marl_airhockey.learn.train import train
 
     folder = tmp_path_factory.mktemp("sb3") / "touch-0"

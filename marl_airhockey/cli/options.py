@@ -23,7 +23,7 @@ from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
-    from marl_airhockey.learn.grade import Metrics
+    from marl_airhockey.learn.evaluate_policy import Metrics
 
 app = typer.Typer(
     help="Air hockey for robot learning and multi-agent RL.",

@@ -30,7 +30,7 @@ from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
-    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.ppo_config import PPOConfig
 
 
 @app.command()
@@ -78,7 +78,7 @@ def train(
 ) -> None:
     """Train a policy with PPO and its preset, or by another --algo; or --resume."""
     from marl_airhockey.learn.algorithms import PPO, make_config
-    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.ppo_config import PPOConfig
 
     given = {
         "physics": physics_of(physics) or None,
@@ -102,16 +102,16 @@ def train(
     changes = {name: value for name, value in shared.items() if value}
     changes |= settings(change) | {"seed": seed, "backend": backend} | given
     config = make_config(algo, scenario, data or [], changes)
-    if isinstance(config, TrainConfig) and steps is not None and not as_json:
+    if isinstance(config, PPOConfig) and steps is not None and not as_json:
         _tell_updates(steps, config, changes)
     kind = "" if algo == PPO else f"{algo}-"
     name = find_scenario(config.scenario).name
     _train(config, out or Path("runs") / f"{name}-{kind}{config.seed}", as_json)
 
 
-def _tell_updates(steps: int, config: TrainConfig, changes: dict[str, Any]) -> None:
+def _tell_updates(steps: int, config: PPOConfig, changes: dict[str, Any]) -> None:
     """Print how many updates a number of steps is, and what is usual."""
-    from marl_airhockey.learn.config import preset
+    from marl_airhockey.learn.ppo_config import preset
 
     others = {name: value for name, value in changes.items() if name != "total_steps"}
     usual = preset(config.scenario, others)
@@ -152,10 +152,10 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
 def _next(folder: Path) -> str:
     """Return the command that measures a run: a league for a game of several teams."""
     from marl_airhockey.learn.algorithms import load_any_config
-    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.ppo_config import PPOConfig
 
     config = load_any_config(folder)
-    if isinstance(config, TrainConfig) and config.self_play:
+    if isinstance(config, PPOConfig) and config.self_play:
         return f"league {config.scenario} {folder} allround striker goalkeeper random"
     return f"evaluate {folder}"
 

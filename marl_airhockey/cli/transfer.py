@@ -31,7 +31,7 @@ from marl_airhockey.registry import find_backend, find_scenario, make_agent
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
-    from marl_airhockey.learn.config import TrainConfig
+    from marl_airhockey.learn.ppo_config import PPOConfig
     from marl_airhockey.transfer.measure import TransferResult
 
 
@@ -168,18 +168,19 @@ def _list(names: str) -> list[str]:
     return list(dict.fromkeys(name.strip() for name in names.split(",")))
 
 
-def _run(folder: Path, config: TrainConfig) -> str:
+def _run(folder: Path, config: PPOConfig) -> str:
     """Train a run, or resume it if it is there; return its folder.
 
     Raises:
         ValueError: a run with other settings, or a cut off one that is not trusted.
     """
-    from marl_airhockey.learn.config import load_config
+    from marl_airhockey.learn.ppo_config import PPOConfig
     from marl_airhockey.learn.run import TrainingRun
+    from marl_airhockey.learn.settings import load_config
 
     begun = (folder / "config.toml").exists()
     if begun:
-        run = TrainingRun(load_config(folder / "config.toml"), folder)
+        run = TrainingRun(load_config(PPOConfig, folder / "config.toml"), folder)
         if run.config != config:
             raise ValueError(f"{folder} holds another run: say another --out")
         if run.steps_left > 0 and (folder / "last.zip").exists():

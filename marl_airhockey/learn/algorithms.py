@@ -7,31 +7,28 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.learn.config import TrainConfig, load_config, preset, read_settings
-from marl_airhockey.learn.hindsight.config import (
-    ALGO as SAC_HER,
-)
-from marl_airhockey.learn.hindsight.config import (
-    HindsightConfig,
-    hindsight_config,
-    load_hindsight_config,
-)
+from marl_airhockey.learn.hindsight.config import ALGO as SAC_HER
+from marl_airhockey.learn.hindsight.config import HindsightConfig, hindsight_config
 from marl_airhockey.learn.offline.config import ALGORITHMS as OFFLINE
-from marl_airhockey.learn.offline.config import (
-    OfflineConfig,
-    load_offline_config,
-    offline_config,
-)
+from marl_airhockey.learn.offline.config import OfflineConfig, offline_config
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
+from marl_airhockey.learn.settings import load_config, read_settings
 
-AnyConfig = TrainConfig | OfflineConfig | HindsightConfig
+AnyConfig = PPOConfig | OfflineConfig | HindsightConfig
 """Configuration of a run of any algorithm"""
 PPO = "ppo"
-"""Algorithm that learns wherever nothing else is said"""
+"""Default algorithm"""
 PLAYING: dict[str, Callable[[str, Mapping[str, Any]], AnyConfig]] = {
     PPO: preset,
     SAC_HER: hindsight_config,
 }
 """Makers of configurations of what learns by playing, by algorithm"""
+KINDS: dict[str, type[AnyConfig]] = {
+    PPO: PPOConfig,
+    SAC_HER: HindsightConfig,
+    **dict.fromkeys(OFFLINE, OfflineConfig),
+}
+"""Classes of configurations, by algorithm"""
 
 
 def make_config(
@@ -71,12 +68,10 @@ def load_any_config(folder: Path) -> AnyConfig:
     """Read the configuration of a run of any algorithm.
 
     Raises:
-        ValueError: see `config.read_settings`.
+        ValueError: see `settings.read_settings`.
     """
     path = folder / "config.toml"
     algo = read_settings(path).get("algo", PPO)
-    if algo == PPO:
-        return load_config(path)
-    if algo == SAC_HER:
-        return load_hindsight_config(path)
-    return load_offline_config(path)
+    if algo not in KINDS:
+        raise ValueError(f"{path}: {unknown_name('algo', algo, KINDS)}")
+    return load_config(KINDS[algo], path)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.learn.config import load_config, preset
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.run import ProgressCallback
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
@@ -29,7 +30,7 @@ def best_response(
     """Train a policy against a fixed player and return its score against it.
 
     In half of the games of training the player is slowed down, see
-    `TrainConfig.opponent_pace`; the score is against the player as it is.
+    `SelfPlayConfig.opponent_speed_range`; the score is against the player as it is.
 
     Args:
         scenario: name of a game of two sides or more.
@@ -47,10 +48,10 @@ def best_response(
         ValueError: the folder holds a run of an older version.
     """
     if (folder / "state.json").exists():
-        load_config(folder / "config.toml")
+        load_config(PPOConfig, folder / "config.toml")
     else:
         only = {"opponents": [player], "rivals": [player]}
-        alone = {"mirror": 0.0, "script_share": 1.0, "snapshots": 1}
+        alone = {"self_play_fraction": 0.0, "scripted_fraction": 1.0, "snapshots": 1}
         length = {"total_steps": steps, "seed": seed, "evaluations": 4}
         train(preset(scenario, {**only, **alone, **length}), folder, report)
     response, rivals = load_policy(folder / "last.npz"), [make_agent(player)]

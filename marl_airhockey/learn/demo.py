@@ -10,8 +10,8 @@ from pathlib import Path
 
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
 from marl_airhockey.evaluation.watch import show_episodes
-from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.plots import plot_learning_curve
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import train, versions
 from marl_airhockey.policies.load import load_policy

@@ -8,18 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from stable_baselines3.common.logger import (
-    CSVOutputFormat,
-    Logger,
-    TensorBoardOutputFormat,
-)
 
-from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Metrics, grade
+from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.logs import Log
+from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.run_config import RunConfig
-from marl_airhockey.learn.self_play import SelfPlayVecEnv
+from marl_airhockey.learn.self_play import SelfPlayEnv
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import find_backend
@@ -37,7 +33,7 @@ class AdaptiveRate:
         rate: first rate.
     """
 
-    def __init__(self, config: TrainConfig, rate: float) -> None:
+    def __init__(self, config: PPOConfig, rate: float) -> None:
         self.rate, self._config = rate, config
 
     def __call__(self, remaining: float) -> float:
@@ -50,7 +46,7 @@ class AdaptiveRate:
         if divergence > 2 * config.target_kl:
             self.rate = max(self.rate / 1.5, 0.03 * config.learning_rate)
         elif divergence < config.target_kl / 2:
-            self.rate = min(self.rate * 1.5, config.highest_rate)
+            self.rate = min(self.rate * 1.5, config.max_learning_rate)
 
 
 @contextmanager
@@ -67,7 +63,7 @@ def training_threads(count: int) -> Iterator[None]:
         torch.set_flush_denormal(False)
 
 
-def end_setup(run: TrainingRun[TrainConfig]) -> None:
+def end_setup(run: TrainingRun[PPOConfig]) -> None:
     """Compile what restarts of worlds need, and count the time until now as setup.
 
     Arms are slow to build and compile next to nothing, so they are left alone.
@@ -77,26 +73,19 @@ def end_setup(run: TrainingRun[TrainConfig]) -> None:
     run.end_setup()
 
 
-def make_logger(folder: Path, steps: int) -> Logger:
-    """Return a logger to CSV and tensorboard; a resumed run begins another CSV."""
-    name = f"progress-{steps}.csv" if steps else "progress.csv"
-    table = CSVOutputFormat(str(folder / name))
-    return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
-
-
-def note_step(logger: Logger, env: AirHockeyVecEnv) -> None:
+def note_step(log: Log, env: SlotEnv) -> None:
     """Log the reward terms of the last step, and scores against opponents."""
     for name, value in env.last_terms.items():
-        logger.record_mean(f"reward/{name}", value)
-    if isinstance(env, SelfPlayVecEnv):
+        log.record_mean(f"reward/{name}", value)
+    if isinstance(env, SelfPlayEnv):
         for name, value in env.scores.items():
-            logger.record(f"score/{name}", value)
+            log.record(f"score/{name}", value)
 
 
-def evaluate_policy(
+def evaluate_and_record(
     run: TrainingRun[RunConfig],
     policy: NumpyPolicy,
-    logger: Logger,
+    log: Log,
     save: Callable[[str], None],
 ) -> Metrics:
     """Evaluate a policy in training and keep it; return the evaluation's row.
@@ -104,12 +93,14 @@ def evaluate_policy(
     Args:
         run: whose folder is kept up to date.
         policy: as it is now.
-        logger: of the run.
+        log: log of the run.
         save: writes it under a name, "best" or "last".
     """
-    metrics = grade(lambda mean: policy_driver(policy, "training", mean), run.config)
+    metrics = evaluate_policy(
+        lambda mean: policy_driver(policy, "training", mean), run.config
+    )
     for name, value in metrics.items():
-        logger.record(f"eval/{name}", value)
+        log.record(f"eval/{name}", value)
     return run.record_evaluation(metrics, save)
 
 

@@ -13,8 +13,9 @@ from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.config import TrainConfig, load_config, preset
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.run import Progress
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.registry import find_scenario, make_agent
@@ -42,7 +43,7 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
         raise ValueError(f"out: {out} must end in .npz or .onnx")
     if out.suffix == ".onnx":
         require("onnx", "offline")
-    config = load_config(run / "config.toml")
+    config = load_config(PPOConfig, run / "config.toml")
     if not (run / "state.json").exists():
         raise ValueError(f"{run}: there is no policy in it yet; train it first")
     progress = Progress.load(run / "state.json")
@@ -80,7 +81,7 @@ def _load_last(run: Path) -> NumpyPolicy:
     return NumpyPolicy.load(run / "last.npz")
 
 
-def _episodes(policy: Policy, config: TrainConfig) -> dict[str, Any]:
+def _episodes(policy: Policy, config: PPOConfig) -> dict[str, Any]:
     result = evaluate(
         policy, "frozen", config.scenario, EPISODES, TEST_SEED, config.keywords
     )
@@ -88,7 +89,7 @@ def _episodes(policy: Policy, config: TrainConfig) -> dict[str, Any]:
     return {"success": result.success, "low": low, "high": high, "episodes": EPISODES}
 
 
-def _games(policy: Policy, config: TrainConfig) -> dict[str, Any]:
+def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
     score, _ = play_against(
         config.scenario,
         policy,
@@ -106,7 +107,7 @@ def _games(policy: Policy, config: TrainConfig) -> dict[str, Any]:
     }
 
 
-def training_command(config: TrainConfig) -> str:
+def training_command(config: PPOConfig) -> str:
     """Return the command line that trains a configuration anew."""
     defaults = preset(config.scenario, {"profile": config.profile, "seed": config.seed})
     words = [f"airhockey train {config.scenario} --seed {config.seed}"]
@@ -116,16 +117,7 @@ def training_command(config: TrainConfig) -> str:
     words += [f"--driver {k}={v}" for k, v in config.drivers.items()]
     named = {"scenario", "profile", "options", "drivers", "seed"}
     if not config.self_play:
-        named |= {
-            "mirror",
-            "opponents",
-            "script_share",
-            "snapshots",
-            "pool",
-            "priority",
-            "opponent_pace",
-        }
-        named |= {"rivals"}
+        named |= {*config.SELF_PLAY}
     for f in fields(config):
         value = getattr(config, f.name)
         if f.name not in named and value != getattr(defaults, f.name):

@@ -1,21 +1,12 @@
-"""Networks of policies: fixed scaling of inputs, conversion to plain arrays."""
+"""Input layer of the networks of stable-baselines3; models pickle it by this name."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3 import PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
-
-from marl_airhockey.learn.run_config import RunConfig
-from marl_airhockey.policies.numpy_policy import NumpyPolicy
-from marl_airhockey.policies.policy import trained_in
-from marl_airhockey.policies.runs import RUN_FORMAT
-from marl_airhockey.policies.sb3 import numpy_actor, scaled_policy
 
 
 class FixedScale(BaseFeaturesExtractor):
@@ -23,8 +14,8 @@ class FixedScale(BaseFeaturesExtractor):
 
     Args:
         observation_space: Box (D,), or the Dict of goals="dict".
-        centre: (D,) of the flat observation.
-        unit: (D,) of the flat observation.
+        centre: Centre (D,) of the flat observation.
+        unit: Typical size (D,) of its difference from the centre.
     """
 
     def __init__(
@@ -49,48 +40,3 @@ class FixedScale(BaseFeaturesExtractor):
         flat = (observations["observation"] - self.centre) * self.rate
         goals = [observations["achieved_goal"], observations["desired_goal"]]
         return torch.cat([flat, *goals], dim=-1)
-
-
-def policy_card(config: RunConfig, labels: Sequence[str]) -> dict[str, Any]:
-    """Return what a policy must be given to see; saved together with it.
-
-    Args:
-        config: of its run.
-        labels: names of the elements of its observations.
-    """
-    return {
-        "run_format": RUN_FORMAT,
-        **trained_in(vars(config)),
-        "observe": config.observe,
-        "labels": list(labels),
-    }
-
-
-def to_numpy(model: PPO, card: Mapping[str, Any]) -> NumpyPolicy:
-    """Return the actor of a model of `sb3.build_model` as plain arrays.
-
-    Raises:
-        ValueError: another kind of model: pixels, other layers.
-    """
-    return numpy_actor(model.policy.state_dict(), card)
-
-
-def layers_to_numpy(
-    layers: Iterable[torch.nn.Module],
-    scale: FixedScale,
-    log_std: torch.Tensor,
-    card: Mapping[str, Any],
-) -> NumpyPolicy:
-    """Return linear layers, with rectifiers between them, as plain arrays."""
-
-    def array(tensor: torch.Tensor) -> Any:
-        return tensor.detach().cpu().numpy().astype(np.float32).copy()
-
-    linear = [layer for layer in layers if isinstance(layer, torch.nn.Linear)]
-    return scaled_policy(
-        [(array(x.weight), array(x.bias)) for x in linear],
-        array(scale.centre),
-        array(1.0 / scale.rate),
-        array(log_std),
-        card,
-    )

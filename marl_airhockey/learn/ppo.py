@@ -7,7 +7,6 @@ What is left out is what surrounds it there, which costs a third of the CPU time
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,62 +15,25 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
-    evaluate_policy,
-    make_logger,
+    evaluate_and_record,
     note_step,
     save_weights,
     training_threads,
 )
-from marl_airhockey.learn.grade import Metrics
-from marl_airhockey.learn.layers import linear_layers, plain_policy
-from marl_airhockey.learn.network import policy_card
+from marl_airhockey.learn.evaluate_policy import Metrics
+from marl_airhockey.learn.logs import RunLog
+from marl_airhockey.learn.networks import ActorCritic
+from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
+from marl_airhockey.learn.self_play import SelfPlayEnv, make_training_env
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
-HALF_LOG_TAU = 0.9189385332046727
-"""ln(2 pi) / 2, of the normal density."""
-
-
-class ActorCritic(nn.Module):
-    """Actor and critic that share no layer, behind a fixed scaling of the input.
-
-    Args:
-        config: widths of the layers and the first standard deviation.
-        centre: (D,) of the observation.
-        unit: (D,) of the observation.
-    """
-
-    def __init__(self, config: TrainConfig, centre: Any, unit: Any) -> None:
-        super().__init__()
-        self.centre: Tensor
-        self.unit: Tensor
-        self.register_buffer("centre", torch.as_tensor(centre))
-        self.register_buffer("unit", torch.as_tensor(unit))
-        widths = [len(centre), *config.hidden]
-        self.actor = linear_layers([*widths, 2], 0.01)
-        self.critic = linear_layers([*widths, 1], 1.0)
-        self.log_std = nn.Parameter(torch.full((2,), config.log_std_init))
-
-    def scaled(self, observation: Tensor) -> Tensor:
-        """Return observations (n, D) as the layers take them."""
-        return (observation - self.centre) / self.unit
-
-    def log_density(self, mean: Tensor, action: Tensor) -> Tensor:
-        """Return the log density (n,) of actions (n, 2) about their means."""
-        gap = (action - mean) * torch.exp(-self.log_std)
-        return (-0.5 * gap * gap - self.log_std - HALF_LOG_TAU).sum(-1)
-
-    def to_numpy(self, card: Mapping[str, Any]) -> NumpyPolicy:
-        """Return the actor as plain arrays."""
-        scale = self.centre, self.unit
-        return plain_policy(self.actor, *scale, self.log_std, card)
 
 
 @dataclass
@@ -123,13 +85,15 @@ class Trainer:
         run: whose folder is kept up to date.
     """
 
-    def __init__(self, run: TrainingRun[TrainConfig]) -> None:
+    def __init__(self, run: TrainingRun[PPOConfig]) -> None:
         config = self._config = run.config
         self._run = run
         torch.manual_seed(config.seed)
         self._env = make_training_env(config, config.num_worlds, run.folder / "pool")
         layout = self._env.world.observer.layout
-        self.model = ActorCritic(config, layout.centre, layout.unit)
+        self.model = ActorCritic(
+            config.hidden, config.log_std_init, layout.centre, layout.unit
+        )
         self._rate = AdaptiveRate(config, run.progress.rate or config.learning_rate)
         self._optimizer = torch.optim.Adam(
             self.model.parameters(), eps=1e-5, fused=True
@@ -141,7 +105,7 @@ class Trainer:
             self._begin_with(Path(config.init))
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
-        self._logger = make_logger(run.folder, run.progress.steps)
+        self._log = RunLog(run.folder, run.progress.steps)
         self._seen = self._env.reset()
         end_setup(run)
 
@@ -157,8 +121,8 @@ class Trainer:
             run.update_progress(steps, self._rate.rate)
             if run.evaluation_due or run.steps_left <= 0:
                 row = self._evaluate()
-            self._logger.dump(steps)
-        self._logger.close()
+            self._log.dump(steps)
+        self._log.close()
         self._env.close()
         return row
 
@@ -191,7 +155,7 @@ class Trainer:
                     for i in np.flatnonzero(done).tolist()
                     if infos[i]["TimeLimit.truncated"]
                 ]
-                note_step(self._logger, env)
+                note_step(self._log, env)
         return kept
 
     def _advantages(self, kept: Rollout) -> tuple[Tensor, Tensor]:
@@ -229,11 +193,9 @@ class Trainer:
             for low in range(0, size, config.batch_size):
                 part = [x[low : low + config.batch_size] for x in mixed]
                 divergences.append(self._descend(*part))
-        self._logger.record("train/approx_kl", float(np.mean(divergences)))
-        self._logger.record("train/learning_rate", rate)
-        self._logger.record(
-            "train/std", float(self.model.log_std.detach().exp().mean())
-        )
+        self._log.record("train/approx_kl", float(np.mean(divergences)))
+        self._log.record("train/learning_rate", rate)
+        self._log.record("train/std", float(self.model.log_std.detach().exp().mean()))
         return float(np.mean(divergences))
 
     def _descend(
@@ -262,20 +224,20 @@ class Trainer:
 
     def _policy(self) -> NumpyPolicy:
         labels = self._env.world.observer.layout.labels
-        card = policy_card(self._config, labels)
+        card = self._config.card(labels)
         return self.model.to_numpy({**card, "steps": self._run.progress.steps})
 
     def _snapshot(self) -> None:
         """Add the learner to the opponents of self-play when it is time."""
         env, steps = self._env, self._run.progress.steps
-        if isinstance(env, SelfPlayVecEnv) and steps >= self._snapshot_due:
+        if isinstance(env, SelfPlayEnv) and steps >= self._snapshot_due:
             env.snapshot(self._policy(), steps)
             self._snapshot_due += self._config.total_steps // self._config.snapshots
 
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the evaluation's row."""
         run, policy = self._run, self._policy()
-        row = evaluate_policy(run, policy, self._logger, self._save)
+        row = evaluate_and_record(run, policy, self._log, self._save)
         if run.config.self_play:
             policy.save(run.checkpoint_path)
         return row
@@ -292,7 +254,7 @@ class Trainer:
             ValueError: no run of this engine, one of an older version or another size.
         """
         if (run / "config.toml").exists():
-            load_config(run / "config.toml")
+            load_config(PPOConfig, run / "config.toml")
         kept = [run / f"{name}.pt" for name in ("best", "last")]
         path = next((file for file in kept if file.exists()), None)
         if path is None:
@@ -310,7 +272,7 @@ class Trainer:
             self._optimizer.load_state_dict(state["optimizer"])
 
 
-def train_with_torch(run: TrainingRun[TrainConfig]) -> Metrics:
+def train_with_torch(run: TrainingRun[PPOConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return Trainer(run).train()

@@ -15,22 +15,22 @@ from pathlib import Path
 
 import ray
 import torch
-from ray.rllib.algorithms.ppo import PPO, PPOConfig
+from ray.rllib.algorithms.ppo import PPO
+from ray.rllib.algorithms.ppo import PPOConfig as RLlibConfig
 from ray.rllib.core import DEFAULT_MODULE_ID
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 
-from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Metrics, grade
-from marl_airhockey.learn.network import policy_card
-from marl_airhockey.learn.rllib_runner import RUNNER_CPU, ActorCritic, BatchRunner
+from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.ppo_config import PPOConfig
+from marl_airhockey.learn.rllib_runner import RUNNER_CPU, BatchRunner, PolicyModule
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import policy_driver
 
 
-def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> PPO:
+def build_algorithm(config: PPOConfig, folder: Path, begun: bool = False) -> PPO:
     """Build RLlib's PPO for a configuration; Ray must run.
 
     Args:
@@ -45,14 +45,14 @@ def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> P
         "unit": layout.unit.tolist(),
         "hidden": config.hidden,
         "log_std_init": config.log_std_init,
-        "card": policy_card(config, probe.world.observer.layout.labels),
+        "card": config.card(layout.labels),
     }
     probe.close()
     rate = config.learning_rate
     settings = {"train": config, "folder": str(folder.resolve()), "begun": begun}
     return (
-        PPOConfig()
-        .environment(env=AirHockeyVecEnv, env_config=settings)
+        RLlibConfig()
+        .environment(env=SlotEnv, env_config=settings)
         .env_runners(
             env_runner_cls=BatchRunner,
             num_env_runners=config.num_env_runners,
@@ -60,7 +60,7 @@ def build_algorithm(config: TrainConfig, folder: Path, begun: bool = False) -> P
             rollout_fragment_length=config.n_steps,
         )
         .learners(num_learners=0)
-        .rl_module(rl_module_spec=RLModuleSpec(ActorCritic, model_config=model))
+        .rl_module(rl_module_spec=RLModuleSpec(PolicyModule, model_config=model))
         .training(
             train_batch_size_per_learner=config.n_steps * config.slots,
             minibatch_size=config.batch_size,
@@ -101,7 +101,7 @@ def start_ray(runners: int) -> None:
     )
 
 
-def _algorithm_state(run: TrainingRun[TrainConfig]) -> Path:
+def _algorithm_state(run: TrainingRun[PPOConfig]) -> Path:
     """Return the folder of the algorithm's state at the steps of ``state.json``.
 
     Folders of other steps are leftovers of a killed process.
@@ -109,7 +109,7 @@ def _algorithm_state(run: TrainingRun[TrainConfig]) -> Path:
     return (run.folder / f"rllib-{run.progress.steps:012d}").resolve()
 
 
-def train_with_rllib(run: TrainingRun[TrainConfig]) -> Metrics:
+def train_with_rllib(run: TrainingRun[PPOConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     config, folder, progress = run.config, run.folder, run.progress
     torch.set_num_threads(config.torch_threads)
@@ -119,7 +119,7 @@ def train_with_rllib(run: TrainingRun[TrainConfig]) -> Metrics:
         algo.restore_from_path(_algorithm_state(run))
 
     def policy() -> NumpyPolicy:
-        module: ActorCritic = algo.get_module(DEFAULT_MODULE_ID)
+        module: PolicyModule = algo.get_module(DEFAULT_MODULE_ID)
         return module.to_numpy()
 
     def save(name: str) -> None:
@@ -127,7 +127,9 @@ def train_with_rllib(run: TrainingRun[TrainConfig]) -> Metrics:
 
     def evaluate() -> Metrics:
         now = policy()
-        metrics = grade(lambda mean: policy_driver(now, "training", mean), config)
+        metrics = evaluate_policy(
+            lambda mean: policy_driver(now, "training", mean), config
+        )
         older = list(folder.glob("rllib-*"))
         algo.save_to_path(_algorithm_state(run))
         row = run.record_evaluation(metrics, save)

@@ -17,9 +17,9 @@ from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner
 from ray.rllib.env.single_agent_episode import SingleAgentEpisode
 from ray.rllib.env.utils.infinite_lookback_buffer import InfiniteLookbackBuffer
 
-from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.network import FixedScale, layers_to_numpy
-from marl_airhockey.learn.self_play import SelfPlayVecEnv, make_training_env
+from marl_airhockey.learn.networks import ActorCritic
+from marl_airhockey.learn.ppo_config import PPOConfig
+from marl_airhockey.learn.self_play import SelfPlayEnv, make_training_env
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.types import Array
 
@@ -27,25 +27,20 @@ RUNNER_CPU = "runner_cpu_seconds"
 """Name of the metric: CPU time of the env runners, s"""
 
 
-class ActorCritic(TorchRLModule, ValueFunctionAPI):
-    """Networks as in the engine "sb3": fixed scaling, two towers, one deviation."""
+class PolicyModule(TorchRLModule, ValueFunctionAPI):
+    """`ActorCritic` as a module of RLlib."""
 
     def setup(self) -> None:
-        settings, space = self.model_config, self.observation_space
-        self.scale = FixedScale(space, settings["centre"], settings["unit"])
-        sizes = [space.shape[0], *settings["hidden"]]
-        self.actor = _tower(sizes, self.action_space.shape[0], 0.01)
-        self.critic = _tower(sizes, 1, 1.0)
-        start = torch.full(self.action_space.shape, settings["log_std_init"])
-        self.log_std = torch.nn.Parameter(start)
+        names = "hidden", "log_std_init", "centre", "unit"
+        self.net = ActorCritic(*(self.model_config[name] for name in names))
 
     def _forward(self, batch: dict[str, Any], **_: Any) -> dict[str, Any]:
-        mean = self.actor(self.scale(batch[Columns.OBS]))
-        spread = self.log_std.expand_as(mean)
+        mean = self.net.actor(self.net.scaled(batch[Columns.OBS]))
+        spread = self.net.log_std.expand_as(mean)
         return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, spread], dim=-1)}
 
     def compute_values(self, batch: dict[str, Any], embeddings: Any = None) -> Any:
-        return self.critic(self.scale(batch[Columns.OBS])).squeeze(-1)
+        return self.net.critic(self.net.scaled(batch[Columns.OBS])).squeeze(-1)
 
     def get_train_action_dist_cls(self) -> type[TorchDiagGaussian]:
         return TorchDiagGaussian
@@ -54,22 +49,8 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
     get_inference_action_dist_cls = get_train_action_dist_cls
 
     def to_numpy(self) -> NumpyPolicy:
-        """Return the actor as plain arrays."""
-        return layers_to_numpy(
-            self.actor, self.scale, self.log_std, self.model_config["card"]
-        )
-
-
-def _tower(sizes: list[int], out: int, gain: float) -> torch.nn.Sequential:
-    """Return rectified layers, initialised as stable-baselines3 does."""
-    layers: list[torch.nn.Module] = []
-    for i, (a, b) in enumerate(zip(sizes, [*sizes[1:], out], strict=True)):
-        last = i == len(sizes) - 1
-        linear = torch.nn.Linear(a, b)
-        torch.nn.init.orthogonal_(linear.weight, gain if last else 2**0.5)
-        torch.nn.init.zeros_(linear.bias)
-        layers += [linear] if last else [linear, torch.nn.ReLU()]
-    return torch.nn.Sequential(*layers)
+        """Return the actor as a NumPy policy."""
+        return self.net.to_numpy(self.model_config["card"])
 
 
 class BatchRunner(SingleAgentEnvRunner):
@@ -77,7 +58,7 @@ class BatchRunner(SingleAgentEnvRunner):
 
     def make_env(self) -> None:
         settings = self.config.env_config
-        self._train: TrainConfig = settings["train"]
+        self._train: PPOConfig = settings["train"]
         shares = max(self.num_workers or 0, 1)
         pool = Path(settings["folder"]) / f"pool-{self.worker_index or 0}"
         self.env = make_training_env(
@@ -116,8 +97,8 @@ class BatchRunner(SingleAgentEnvRunner):
                 logp[t] = distribution.logp(action).numpy()
                 parameters[t] = inputs.numpy()
             chosen[t] = action.numpy()
-            self.env.step_async(np.clip(chosen[t], -1.0, 1.0))
-            self._seen, reward[t], done[t], infos = self.env.step_wait()
+            given = np.clip(chosen[t], -1.0, 1.0)
+            self._seen, reward[t], done[t], infos = self.env.step(given)
             for slot in np.flatnonzero(done[t]).tolist():
                 finals[t, slot] = infos[slot]
         seen[steps] = self._seen
@@ -148,7 +129,7 @@ class BatchRunner(SingleAgentEnvRunner):
     def _take_snapshot(self) -> None:
         """Add the policy as it is to this runner's pool of opponents if it is due."""
         steps = max(self._own_steps * self._shares, self.num_env_steps_sampled_lifetime)
-        if isinstance(self.env, SelfPlayVecEnv) and steps >= self._due:
+        if isinstance(self.env, SelfPlayEnv) and steps >= self._due:
             self.env.snapshot(self.module.to_numpy(), steps)
             every = self._train.total_steps // self._train.snapshots
             self._due = (steps // every + 1) * every

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.run_config import RunConfig
 
 ProgressCallback = Callable[[int, int, Metrics], None]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar
 
+from marl_airhockey.policies.policy import trained_in
 from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.registry import DEFAULT_BACKEND
 from marl_airhockey.world.build import Keywords
@@ -71,8 +73,21 @@ class RunConfig:
             "control_dt": self.control_dt,
         }
 
+    def card(self, labels: Sequence[str]) -> dict[str, Any]:
+        """Return the card of a policy of this run: the environment that it needs.
+
+        Args:
+            labels: Names of the elements of its observations.
+        """
+        return {
+            "run_format": RUN_FORMAT,
+            **trained_in(vars(self)),
+            "observe": self.observe,
+            "labels": list(labels),
+        }
+
     def to_toml(self) -> str:
-        """Return the configuration as TOML, readable by `config.load_config`."""
+        """Return the configuration as TOML, readable by `settings.load_config`."""
         lines, tables = [f"format = {RUN_FORMAT}"], []
         for name, value in asdict(self).items():
             if isinstance(value, dict):

@@ -6,33 +6,39 @@ from pathlib import Path
 
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.logger import (
+    CSVOutputFormat,
+    Logger,
+    TensorBoardOutputFormat,
+)
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig, load_config
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
-    make_logger,
     training_threads,
 )
-from marl_airhockey.learn.grade import Metrics
-from marl_airhockey.learn.network import FixedScale, policy_card
+from marl_airhockey.learn.evaluate_policy import Metrics
+from marl_airhockey.learn.logs import progress_path
+from marl_airhockey.learn.network import FixedScale
+from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.sb3_callback import TrainingCallback
 from marl_airhockey.learn.self_play import make_training_env
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.sb3 import load_weights
 
 
-def train_with_sb3(run: TrainingRun[TrainConfig]) -> Metrics:
+def train_with_sb3(run: TrainingRun[PPOConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return _train(run)
 
 
-def _train(run: TrainingRun[TrainConfig]) -> Metrics:
+def _train(run: TrainingRun[PPOConfig]) -> Metrics:
     config, folder, progress = run.config, run.folder, run.progress
     rate = AdaptiveRate(config, progress.rate or config.learning_rate)
-    env = make_training_env(config, config.num_worlds, folder / "pool")
+    env = AirHockeyVecEnv(make_training_env(config, config.num_worlds, folder / "pool"))
     if progress.steps:
         model = PPO.load(folder / "last.zip", env, device="cpu")
         model.learning_rate = model.lr_schedule = rate
@@ -65,7 +71,7 @@ def _take_weights(model: PPO, run: Path) -> None:
     if path is None:
         raise ValueError(f"init: {run} is no folder of a run of the engine sb3")
     if (run / "config.toml").exists():
-        load_config(run / "config.toml")
+        load_config(PPOConfig, run / "config.toml")
     weights = load_weights(path)
     try:
         model.policy.load_state_dict(weights)
@@ -73,7 +79,13 @@ def _take_weights(model: PPO, run: Path) -> None:
         raise ValueError(f"init: {run} has another size: {error}") from error
 
 
-def build_model(config: TrainConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -> PPO:
+def make_logger(folder: Path, steps: int) -> Logger:
+    """Return a logger to the files of `logs.RunLog`."""
+    table = CSVOutputFormat(str(progress_path(folder, steps)))
+    return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
+
+
+def build_model(config: PPOConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -> PPO:
     """Build a fresh PPO model for an environment, with its card as ``model.card``."""
     layout = env.world.observer.layout
     policy, extra = "MlpPolicy", {}
@@ -111,5 +123,5 @@ def build_model(config: TrainConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -
         },
     )
     # SB3 saves it with the model: the file alone says what the policy must see.
-    vars(model)["card"] = policy_card(config, env.world.observer.layout.labels)
+    vars(model)["card"] = config.card(layout.labels)
     return model

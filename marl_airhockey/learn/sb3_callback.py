@@ -9,14 +9,15 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.config import TrainConfig
+from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.engine import AdaptiveRate, note_step
-from marl_airhockey.learn.grade import Metrics, grade
-from marl_airhockey.learn.network import to_numpy
+from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.learn.self_play import SelfPlayVecEnv
+from marl_airhockey.learn.self_play import SelfPlayEnv
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy
+from marl_airhockey.policies.sb3 import numpy_actor
 
 
 class TrainingCallback(BaseCallback):
@@ -27,7 +28,7 @@ class TrainingCallback(BaseCallback):
         rate: learning rate of the model.
     """
 
-    def __init__(self, run: TrainingRun[TrainConfig], rate: AdaptiveRate) -> None:
+    def __init__(self, run: TrainingRun[PPOConfig], rate: AdaptiveRate) -> None:
         super().__init__()
         self.run, self.rate = run, rate
         # The first snapshot is due at once: self-play needs an opponent.
@@ -36,7 +37,7 @@ class TrainingCallback(BaseCallback):
     def _to_numpy(self) -> NumpyPolicy:
         """Return the policy as it is."""
         assert isinstance(self.model, PPO)
-        return to_numpy(self.model, self.card)
+        return numpy_actor(self.model.policy.state_dict(), self.card)
 
     @property
     def card(self) -> dict[str, Any]:
@@ -44,10 +45,13 @@ class TrainingCallback(BaseCallback):
         return {**vars(self.model)["card"], "steps": self.num_timesteps}
 
     def _on_step(self) -> bool:
-        env = self.training_env
-        assert isinstance(env, AirHockeyVecEnv)
-        note_step(self.logger, env)
+        note_step(self.logger, self._slots)
         return True
+
+    @property
+    def _slots(self) -> SlotEnv:
+        assert isinstance(self.training_env, AirHockeyVecEnv)
+        return self.training_env.slots
 
     def _on_rollout_start(self) -> None:
         divergence = self.logger.name_to_value.get("train/approx_kl")
@@ -56,8 +60,8 @@ class TrainingCallback(BaseCallback):
         self._update_progress()
         if self.run.evaluation_due:
             self.evaluate()
-        env, config = self.training_env, self.run.config
-        if isinstance(env, SelfPlayVecEnv) and self.num_timesteps >= self._snapshot_due:
+        env, config = self._slots, self.run.config
+        if isinstance(env, SelfPlayEnv) and self.num_timesteps >= self._snapshot_due:
             env.snapshot(self._to_numpy(), self.num_timesteps)
             self._snapshot_due += config.total_steps // config.snapshots
 
@@ -70,7 +74,7 @@ class TrainingCallback(BaseCallback):
         run, model = self.run, self.model
         predict = partial(_predict, model)
         shape = model.observation_space.shape
-        metrics = grade(
+        metrics = evaluate_policy(
             lambda mean: Policy(predict, shape, run.config.observe, "training", mean),
             run.config,
         )

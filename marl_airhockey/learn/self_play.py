@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.evaluation.games import teams_of
 from marl_airhockey.learn.action_penalty import ActionPenalty
-from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.make import make_sb3_vec
+from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import make_agent
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.roster import Roster
 from marl_airhockey.world.step_result import StepResult
 
@@ -25,60 +22,38 @@ SCORE_WEIGHT = 0.05
 """Weight of the latest game in the running score against an opponent"""
 
 
-class SelfPlayVecEnv(AirHockeyVecEnv):
-    """Vector environment of the learner: all seats of some worlds, one team in others.
+class SelfPlayEnv(SlotEnv):
+    """Slots of the learner: all seats of some worlds, one team in the others.
 
     In those others, at every start of an episode, the learner is given a team and all
-    other teams the same opponent. It is drawn from scripts and from the pool of
-    snapshots: the more often the learner loses to one, the more likely (prioritised
-    fictitious self-play; Vinyals et al., 2019). In half of these games it moves slower
-    than it wants to.
+    other teams the same opponent. It is sampled from scripts and from the pool
+    of snapshots: the more often the learner loses to one, the more likely (prioritized
+    fictitious self-play; Vinyals et al., 2019). In half of these games it moves at a
+    share of its commanded speed.
 
     Args:
-        scenario: name of a game with teams.
-        num_worlds: number of worlds, B.
-        keywords: keywords of the environment.
-        scripts: names of drivers that are always in the pool.
-        mirror: share of the worlds in which the learner plays all seats.
-        script_share: share of the other worlds' games that are against scripts.
-        priority: power of the share of lost games in the drawing.
-        pace: smallest share of their commanded speed at which opponents move.
-        size: most snapshots in the pool.
-        folder: folder of the snapshots.
-        seed: seed of the drawing.
+        config: Settings of the run.
+        num_worlds: Number of worlds, B.
+        folder: Folder of the snapshots.
     """
 
-    def __init__(
-        self,
-        scenario: str,
-        num_worlds: int,
-        keywords: Keywords,
-        *,
-        scripts: Sequence[str],
-        mirror: float,
-        script_share: float,
-        priority: float,
-        pace: float,
-        size: int,
-        folder: Path,
-        seed: int,
-    ) -> None:
-        scripted = {name: make_agent(name) for name in scripts}
+    def __init__(self, config: SelfPlayConfig, num_worlds: int, folder: Path) -> None:
+        scripted = {name: make_agent(name) for name in config.opponents}
         forms = [driver.observe for driver in scripted.values() if driver.observe]
-        super().__init__(scenario, num_worlds, forms=forms, **keywords)
+        keywords = config.training_keywords
+        super().__init__(config.scenario, num_worlds, forms, **keywords)
+        self._config, self._folder = config, folder
         scene = self.world.scene
         self._teams = teams_of([seat.team for seat in scene.seats])
         members = [np.flatnonzero(self._teams == t) for t in np.unique(self._teams)]
         self._members = np.array(members)
-        self._mirrored = round(mirror * num_worlds)
-        self._priority, self._size, self._folder = priority, size, folder
-        self._script_share = script_share if scripts else 0.0
-        self._rng = np.random.default_rng(seed)
-        self._slowest, self._pace = pace, np.ones(num_worlds)
+        self._mirrored = round(config.self_play_fraction * num_worlds)
+        self._rng = np.random.default_rng(config.seed)
+        self._pace = np.ones(num_worlds)
         self._roster = Roster(self.world)
         for name, driver in scripted.items():
             self._roster.add(name, driver)
-        self._scripts = len(scripts)
+        self._scripts = len(scripted)
         self._scores = np.full(self._scripts, 0.5)
         self._snapshots: list[Path] = []
         mirrored = np.arange(self._mirrored)
@@ -116,7 +91,7 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
 
     def _add_opponent(self, path: Path) -> None:
         driver = policy_driver(NumpyPolicy.load(path), str(path), deterministic=False)
-        if len(self._snapshots) < self._size:
+        if len(self._snapshots) < self._config.pool:
             self._roster.add(path.stem, driver)
             self._scores = np.append(self._scores, 0.5)
             self._snapshots.append(path)
@@ -130,10 +105,15 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         self._begin(np.flatnonzero((self._roster.seated == player).any(-1)))
 
     def _draw(self, count: int) -> Array:
-        """Draw (count,) opponents, by number."""
-        weight = np.maximum(1.0 - self._scores, 0.0) ** self._priority + 0.02
+        """Sample (count,) opponents, by number."""
+        config = self._config
+        weight = (
+            np.maximum(1.0 - self._scores, 0.0) ** config.opponent_sampling_exponent
+            + 0.02
+        )
         groups = slice(0, self._scripts), slice(self._scripts, None)
-        shares = self._script_share, 1.0 - self._script_share
+        scripted = config.scripted_fraction if self._scripts else 0.0
+        shares = scripted, 1.0 - scripted
         for group, share in zip(groups, shares, strict=True):
             total = weight[group].sum()
             weight[group] *= share / total if total else 0.0
@@ -146,7 +126,8 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
             return
         seated = self._roster.seated
         seated[worlds] = self._draw(len(worlds))[:, None]
-        pace = self._rng.uniform(self._slowest, 1.0, len(worlds))
+        low, high = self._config.opponent_speed_range
+        pace = self._rng.uniform(low, high, len(worlds))
         full = self._rng.random(len(worlds)) < 0.5
         self._pace[worlds] = np.where(full, 1.0, pace)
         self._learner[worlds] = self._rng.integers(0, len(self._members), len(worlds))
@@ -181,50 +162,34 @@ class SelfPlayVecEnv(AirHockeyVecEnv):
         return int(self._rows[slot])
 
     def reset(self) -> Any:
-        """Begin an episode in every world."""
+        """Begin an episode in every world; return the observations (slots, ...)."""
         self._returns[:], self._lengths[:] = 0.0, 0
         observation = self.world.reset()
         self._begin(np.arange(self.world.num_worlds))
-        return self._slots(observation)
+        return self.of_slots(observation)
 
-    def step_async(self, actions: Array) -> None:
-        """Take the learner's actions (slots, 2) and let the opponents choose theirs."""
-        self._actions = np.zeros((self.world.num_worlds, len(self._teams), 2))
-        self._roster.ask(self._actions)
-        self._actions *= self._pace[:, None, None]
-        self._actions[self._rows, self._seats] = actions
+    def _of_worlds(self, actions: Array) -> Array:
+        """Return the actions of all seats: the learner's, and those of opponents."""
+        every = np.zeros((self.world.num_worlds, len(self._teams), 2))
+        self._roster.ask(every)
+        every *= self._pace[:, None, None]
+        every[self._rows, self._seats] = actions
+        return every
 
 
-def make_training_env(
-    config: TrainConfig, num_worlds: int, pool: Path
-) -> AirHockeyVecEnv:
+def make_training_env(config: SelfPlayConfig, num_worlds: int, pool: Path) -> SlotEnv:
     """Build the worlds that a configuration is trained in, or a part of them.
 
     Args:
-        config: configuration of the run.
-        num_worlds: number of worlds.
-        pool: folder of the snapshots of self-play.
+        config: Configuration of the run.
+        num_worlds: Number of worlds.
+        pool: Folder of the snapshots of self-play.
     """
-    env = _worlds(config, num_worlds, pool)
+    if config.self_play:
+        env: SlotEnv = SelfPlayEnv(config, num_worlds, pool)
+    else:
+        env = SlotEnv(config.scenario, num_worlds, **config.training_keywords)
     weights = config.action_rate_weight, config.action_jerk_weight, config.cost_weight
     if any(weights):
         env.penalty = ActionPenalty(*weights)
     return env
-
-
-def _worlds(config: TrainConfig, num_worlds: int, pool: Path) -> AirHockeyVecEnv:
-    if not config.self_play:
-        return make_sb3_vec(config.scenario, num_worlds, **config.training_keywords)
-    return SelfPlayVecEnv(
-        config.scenario,
-        num_worlds,
-        config.training_keywords,
-        scripts=config.opponents,
-        mirror=config.mirror,
-        script_share=config.script_share,
-        priority=config.priority,
-        pace=config.opponent_pace,
-        size=config.pool,
-        folder=pool,
-        seed=config.seed,
-    )

@@ -11,15 +11,16 @@ import json
 import platform
 import subprocess
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.learn.algorithms import AnyConfig, load_any_config
-from marl_airhockey.learn.config import TrainConfig
-from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
 from marl_airhockey.policies.trust import trust_code
 from marl_airhockey.registry import make_agent
@@ -78,7 +79,8 @@ def _continuation(
         ValueError: an unknown engine or opponent.
     """
     if isinstance(config, OfflineConfig):
-        require("stable_baselines3", "train")
+        require("torch", "train")
+        require("tensorboard", "train")
         from marl_airhockey.learn.offline.learner import train_offline
 
         return lambda: _go_on(train_offline, TrainingRun(config, folder, report))
@@ -111,7 +113,7 @@ def _remove(folder: Path, kept: set[Path]) -> None:
         folder.rmdir()
 
 
-Engine = Callable[[TrainingRun[TrainConfig]], Metrics]
+Engine = Callable[[TrainingRun[PPOConfig]], Metrics]
 """Function that trains a run to its end and returns the last evaluation"""
 
 
@@ -123,7 +125,8 @@ def _sb3() -> Engine:
 
 
 def _torch() -> Engine:
-    require("stable_baselines3", "train")
+    require("torch", "train")
+    require("tensorboard", "train")
     from marl_airhockey.learn.ppo import train_with_torch
 
     return train_with_torch
@@ -148,8 +151,10 @@ def versions() -> dict[str, str]:
     """Return versions of all that a result may depend on; a checkout's git hash."""
     names = ("marl_airhockey", "numpy", "gymnasium", "pettingzoo", "pymunk", "torch")
     found = {"python": platform.python_version()}
-    for name in (*names, "stable_baselines3"):
+    for name in names:
         found[name] = metadata.version(name)
+    with suppress(metadata.PackageNotFoundError):
+        found["stable_baselines3"] = metadata.version("stable_baselines3")
     git = ["git", "-C", str(Path(__file__).parent)]
     try:
         # An installed copy may lie inside an unrelated repository.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from marl_airhockey.core.errors import require
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.policies.runs import check_run_format
+from marl_airhockey.policies.torch_weights import policy_of_weights
 from marl_airhockey.policies.trust import require_trust
 from marl_airhockey.types import Array
 
@@ -102,40 +103,14 @@ def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPol
     layers = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(weights))]
     layers = [*(name for name in layers if f"{name}.weight" in weights), "action_net"]
     try:
-
-        def array(name: str) -> Array:
-            return np.array(weights[name].detach().cpu().numpy(), np.float32)
-
-        centre, rate = (array(f"features_extractor.{n}") for n in ("centre", "rate"))
-        pairs = [(array(f"{n}.weight"), array(f"{n}.bias")) for n in layers]
-        log_std = array("log_std")
+        rate = weights["features_extractor.rate"]
+        scale = weights["features_extractor.centre"], 1.0 / rate
+        return policy_of_weights(weights, layers, scale, weights["log_std"], card)
     except KeyError as error:
         raise ValueError(
             f"no .npz holds this policy (it has no {error}): only those on flat "
             "observations or goals, with ReLU layers"
         ) from error
-    return scaled_policy(pairs, centre, 1.0 / rate, log_std, card)
-
-
-def scaled_policy(
-    layers: Sequence[tuple[Array, Array]],
-    centre: Array,
-    unit: Array,
-    log_std: Array,
-    card: Mapping[str, Any],
-) -> NumpyPolicy:
-    """Return a policy whose goals, if it has some, follow the flat part as they are.
-
-    Args:
-        layers: see `NumpyPolicy`.
-        centre: (D,) of the flat part.
-        unit: (D,) of the flat part.
-        log_std: see `NumpyPolicy`.
-        card: see `NumpyPolicy`.
-    """
-    goals = (0, layers[0][0].shape[1] - len(centre))
-    unit = np.pad(unit, goals, constant_values=1.0)
-    return NumpyPolicy(layers, np.pad(centre, goals), unit, log_std, card)
 
 
 def load_weights(path: Path) -> Mapping[str, Any]:

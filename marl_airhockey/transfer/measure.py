@@ -10,7 +10,8 @@ from typing import Any
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
-from marl_airhockey.learn.config import TrainConfig, load_config, preset
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.world.build import Keywords
 
 TUNING: dict[str, Any] = {
@@ -19,7 +20,7 @@ TUNING: dict[str, Any] = {
     "n_steps": 64,
     "batch_size": 512,
     "learning_rate": 5e-5,
-    "highest_rate": 1e-4,
+    "max_learning_rate": 1e-4,
     "evaluations": 5,
     "eval_episodes": 50,
 }
@@ -79,7 +80,7 @@ def measure_transfer(
     return rows
 
 
-def fine_tuning_config(run: Path, steps: int) -> TrainConfig:
+def fine_tuning_config(run: Path, steps: int) -> PPOConfig:
     """Return the configuration that trains a run's policy further on robosuite.
 
     Args:
@@ -89,11 +90,11 @@ def fine_tuning_config(run: Path, steps: int) -> TrainConfig:
     Raises:
         ValueError: no run, or one of an older version.
     """
-    config = load_config(run / "config.toml")
+    config = load_config(PPOConfig, run / "config.toml")
     return dataclasses.replace(config, **TUNING, init=str(run), total_steps=steps)
 
 
-def pretraining_config(scenario: str, profile: str, seed: int) -> TrainConfig:
+def pretraining_config(scenario: str, profile: str, seed: int) -> PPOConfig:
     """Return the preset for a scenario, on the 2D table (backend "numba")."""
     return preset(scenario, {"profile": profile, "seed": seed})
 

@@ -4,7 +4,7 @@ import numpy as np
 from runs import SMALL
 
 from marl_airhockey.learn.action_penalty import ActionPenalty
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play import make_training_env
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from marl_airhockey.learn.config import load_config, preset
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
+from marl_airhockey.learn.settings import load_config
 
 
 def test_presets_are_whole_and_bad_settings_are_named(scenario):
@@ -25,10 +26,10 @@ def test_a_configuration_survives_its_file(tmp_path):
     assert config.observe == "estimate"
     path = tmp_path / "config.toml"
     path.write_text(config.to_toml())
-    assert load_config(path) == config
+    assert load_config(PPOConfig, path) == config
     path.write_text("nothing = 1")
     with pytest.raises(ValueError, match="no training configuration"):
-        load_config(path)
+        load_config(PPOConfig, path)
 
 
 def test_policies_for_robots_learn_with_faster_servos_than_they_are_measured_with():
@@ -51,3 +52,20 @@ def test_shots_are_paid_in_training_alone():
     assert "shot_weight" not in config.keywords["options"]
     given = preset("duel", {"options": {"shot_weight": 0.0}})
     assert given.training_keywords["options"] == {"shot_weight": 0.0}
+
+
+def test_settings_of_earlier_versions_are_read_by_their_new_names(tmp_path):
+    old = {"mirror": 0.25, "script_share": 0.75, "priority": 1.0, "opponent_pace": 0.5}
+    config = preset("duel", {**old, "highest_rate": 1e-3})
+    assert config.self_play_fraction == 0.25
+    assert config.scripted_fraction == 0.75
+    assert config.opponent_sampling_exponent == 1.0
+    assert config.opponent_speed_range == [0.5, 1.0]
+    assert config.max_learning_rate == 1e-3
+    path = tmp_path / "config.toml"
+    text = config.to_toml().replace("opponent_speed_range = [0.5, 1.0]", "")
+    text = text.replace("self_play_fraction", "mirror")
+    path.write_text(text.replace("seed = 0", "seed = 0\nopponent_pace = 0.5"))
+    assert load_config(PPOConfig, path) == config
+    with pytest.raises(ValueError, match="opponent_speed_range"):
+        preset("duel", {"opponent_speed_range": [0.9, 0.1]})

@@ -7,8 +7,8 @@ pytest.importorskip("stable_baselines3")
 
 from typer.testing import CliRunner
 
+import marl_airhockey as ah
 from marl_airhockey.cli.main import app
-from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.hindsight.config import hindsight_config
 from marl_airhockey.learn.hindsight.sac import Evaluations, build_model
@@ -29,7 +29,7 @@ SMALL = {
 
 def test_the_policy_of_a_file_is_that_of_the_model(tmp_path):
     config = hindsight_config("reach", SMALL)
-    env = AirHockeyVecEnv("reach", 4, **config.keywords)
+    env = ah.make_sb3_vec("reach", 4, **config.keywords)
     model = build_model(config, env)
     model.learn(1200)
     run = TrainingRun(config, tmp_path)

@@ -15,8 +15,8 @@ from tutorials import run
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.learn.config import preset
 from marl_airhockey.learn.export import export_policy
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.registry import make_agent
 

@@ -14,8 +14,8 @@ from runs import SMALL, rows
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.best_response import best_response
-from marl_airhockey.learn.config import TrainConfig, preset
 from marl_airhockey.learn.export import export_policy
+from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.runs import RUN_FORMAT
@@ -120,7 +120,7 @@ def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
 )
 def test_presets_learn_their_tasks(task, tmp_path):
     config = preset(task)
-    assert isinstance(config, TrainConfig)
+    assert isinstance(config, PPOConfig)
     row = train(config, tmp_path / task)
     assert row["success"] >= 0.9
 

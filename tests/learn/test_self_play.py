@@ -5,13 +5,18 @@ from runs import SMALL, rows
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.league import find_policies
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play import make_training_env
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.load import load_policy
 
 GAME = {**SMALL, "num_worlds": 32, "batch_size": 256, "n_steps": 16, "snapshots": 4}
-GAME |= {"options": {"seconds": 3.0}, "eval_episodes": 4, "pool": 2, "mirror": 0.5}
+GAME |= {
+    "options": {"seconds": 3.0},
+    "eval_episodes": 4,
+    "pool": 2,
+    "self_play_fraction": 0.5,
+}
 GAME |= {"total_steps": 6144, "opponents": ["random", "goalkeeper"]}
 
 
@@ -47,8 +52,10 @@ def test_learners_and_opponents_share_an_environment(tmp_path):
 
 
 def test_opponents_move_slower_in_half_of_the_games_that_do_not_count(tmp_path):
-    alone = {"mirror": 0.0, "script_share": 1.0, "num_worlds": 64}
-    _, env = training_env(tmp_path, opponents=["random"], opponent_pace=0.2, **alone)
+    alone = {"self_play_fraction": 0.0, "scripted_fraction": 1.0, "num_worlds": 64}
+    _, env = training_env(
+        tmp_path, opponents=["random"], opponent_speed_range=[0.2, 1.0], **alone
+    )
     env.reset()
     pace = env._pace.copy()
     assert 16 < (pace == 1.0).sum() < 48
@@ -57,11 +64,11 @@ def test_opponents_move_slower_in_half_of_the_games_that_do_not_count(tmp_path):
     idle = np.zeros((env.num_envs, 2))
     most = np.zeros(64)
     for _ in range(20):
-        env.step_async(idle)
         theirs = env._roster.seated >= 0
-        most = np.maximum(most, np.abs(env._actions * theirs[..., None]).max((1, 2)))
-        assert not env._actions[~theirs].any()
-        env.step_wait()
+        env.step(idle)
+        given = env.world.requested
+        most = np.maximum(most, np.abs(given * theirs[..., None]).max((1, 2)))
+        assert not given[~theirs].any()
     assert (most <= pace).all()
     assert (most > 0.7 * pace).all()
     # Only worlds whose opponents play at full pace change the score.

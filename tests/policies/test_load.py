@@ -8,7 +8,7 @@ from stable_baselines3 import PPO, SAC
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.sb3 import build_model
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
@@ -83,11 +83,13 @@ def test_a_policy_can_sit_in_any_seat_by_its_path(touch_run):
 def test_an_exported_policy_is_one_small_file(tmp_path):
     config = preset("reach", SMALL)
     env = ah.make_sb3_vec("reach", 32, backend="numba")
-    from marl_airhockey.learn.network import to_numpy
     from marl_airhockey.learn.sb3_callback import AdaptiveRate
+    from marl_airhockey.policies.sb3 import numpy_actor
 
     model = build_model(config, env, AdaptiveRate(config, 1e-3))
-    to_numpy(model, {"scenario": "reach"}).save(tmp_path / "policy.npz")
+    numpy_actor(model.policy.state_dict(), {"scenario": "reach"}).save(
+        tmp_path / "policy.npz"
+    )
     assert (tmp_path / "policy.npz").stat().st_size < 300_000
     driver = make_agent(tmp_path / "policy.npz")
     seen = env.reset()

@@ -10,7 +10,8 @@ from stable_baselines3 import PPO
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.league import find_policies
-from marl_airhockey.learn.config import load_config
+from marl_airhockey.learn.ppo_config import PPOConfig
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.trust import Trust
@@ -194,5 +195,5 @@ def test_a_run_of_somebody_else_runs_no_code_unasked(touch_run, tmp_path):
         assert old in text
         (tmp_path / "config.toml").write_text(text.replace(old, new))
         with pytest.raises(ValueError, match="the name of Python code"):
-            load_config(tmp_path / "config.toml")
+            load_config(PPOConfig, tmp_path / "config.toml")
     assert not sprung.exists()

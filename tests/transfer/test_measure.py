@@ -5,7 +5,7 @@ import json
 import pytest
 
 from marl_airhockey.cli.main import app
-from marl_airhockey.learn.config import preset
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import train
 from marl_airhockey.policies.trust import Trust
 from marl_airhockey.registry import make_agent

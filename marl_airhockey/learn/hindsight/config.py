@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.learn.config import read_settings
 from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.learn.settings import check_names
 from marl_airhockey.registry import find_scenario, scenario_names
 
 ALGO = "sac_her"
@@ -71,22 +70,7 @@ def hindsight_config(scenario: str, changes: Mapping[str, Any]) -> HindsightConf
     Raises:
         ValueError: a scenario without goals, or a bad setting.
     """
-    known = [f.name for f in fields(HindsightConfig)]
-    for name in changes:
-        if name not in known:
-            raise ValueError(unknown_name("setting", name, known))
+    check_names(HindsightConfig, changes)
     options = {**changes.get("options", {}), "goals": "dict"}
     merged = {"hidden": [256, 256], **changes, "options": options}
     return HindsightConfig(**{**merged, "scenario": scenario})
-
-
-def load_hindsight_config(path: Path) -> HindsightConfig:
-    """Read what `RunConfig.to_toml` wrote of such a run.
-
-    Raises:
-        ValueError: see `config.read_settings`.
-    """
-    try:
-        return HindsightConfig(**read_settings(path))
-    except TypeError as error:
-        raise ValueError(f"{path} is no training configuration: {error}") from error

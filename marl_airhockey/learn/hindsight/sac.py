@@ -15,17 +15,19 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.engine import (
-    evaluate_policy,
-    make_logger,
+    evaluate_and_record,
     note_step,
     training_threads,
 )
-from marl_airhockey.learn.grade import Metrics
+from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.hindsight.config import HindsightConfig
-from marl_airhockey.learn.network import FixedScale, layers_to_numpy, policy_card
+from marl_airhockey.learn.network import FixedScale
 from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.learn.sb3 import make_logger
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.torch_weights import policy_of_weights
 
 REPORT = 100
 """Steps of all worlds from one report of progress to the next"""
@@ -40,7 +42,9 @@ def train_with_hindsight(run: TrainingRun[HindsightConfig]) -> Metrics:
     """
     config = run.config
     with training_threads(config.torch_threads):
-        env = AirHockeyVecEnv(config.scenario, config.num_worlds, **config.keywords)
+        env = AirHockeyVecEnv(
+            SlotEnv(config.scenario, config.num_worlds, **config.keywords)
+        )
         logger = make_logger(run.folder, run.progress.steps)
         try:
             return _train(run, env, logger)
@@ -103,7 +107,7 @@ def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> SAC:
             },
         },
     )
-    vars(model)["card"] = policy_card(config, layout.labels)
+    vars(model)["card"] = config.card(layout.labels)
     return model
 
 
@@ -127,7 +131,7 @@ class Evaluations(BaseCallback):
     def _on_step(self) -> bool:
         env = self.training_env
         assert isinstance(env, AirHockeyVecEnv)
-        note_step(self.logger, env)
+        note_step(self.logger, env.slots)
         if self.n_calls % REPORT == 0:
             self._update_progress()
             started = self.num_timesteps > self._sac.learning_starts
@@ -146,7 +150,7 @@ class Evaluations(BaseCallback):
     def evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the evaluation's row."""
         self._update_progress()
-        return evaluate_policy(self._run, self._policy(), self.logger, self._save)
+        return evaluate_and_record(self._run, self._policy(), self.logger, self._save)
 
     def _policy(self) -> NumpyPolicy:
         """Return the mean action of the policy as it is."""
@@ -159,13 +163,15 @@ class Evaluations(BaseCallback):
             "bounded": True,
         }
         actor: Any = model.actor
-        layers = [*actor.latent_pi, actor.mu]
+        hidden = [f"latent_pi.{2 * k}" for k in range(len(self._run.config.hidden))]
+        scale = actor.features_extractor.centre, 1.0 / actor.features_extractor.rate
         # Its exploration differs from state to state: what it is on the whole.
         seen = model.replay_buffer.sample(SAMPLE, env=model.get_vec_normalize_env())
         with torch.no_grad():
             off = actor(seen.observations) - actor(seen.observations, True)
         noise = torch.log(off.std(0).clamp(min=1e-3))
-        return layers_to_numpy(layers, actor.features_extractor, noise, card)
+        weights, layers = actor.state_dict(), [*hidden, "mu"]
+        return policy_of_weights(weights, layers, scale, noise, card)
 
     def _save(self, name: str) -> None:
         folder = self._run.folder

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.data.files import recordings_in, shared_head
-from marl_airhockey.learn.config import read_settings
 from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.learn.settings import check_names
 
 STEPS = {"bc": 20_000, "iql": 20_000}
 """Gradient steps of each algorithm, unless told otherwise"""
@@ -78,10 +78,7 @@ def offline_config(
     """
     if algo not in ALGORITHMS:
         raise ValueError(unknown_name("algo", algo, ALGORITHMS))
-    known = [f.name for f in fields(OfflineConfig)]
-    for name in changes:
-        if name not in known:
-            raise ValueError(unknown_name("setting", name, known))
+    check_names(OfflineConfig, changes)
     files = recordings_in([Path(path) for path in data])
     head = shared_head(files)
     for name in ("scenario", "options", "observe", "control_dt"):
@@ -109,15 +106,3 @@ def offline_config(
     return OfflineConfig(
         algo=algo, data=[str(path.resolve()) for path in files], **settings
     )
-
-
-def load_offline_config(path: Path) -> OfflineConfig:
-    """Read what `RunConfig.to_toml` wrote of such a run.
-
-    Raises:
-        ValueError: see `config.read_settings`.
-    """
-    try:
-        return OfflineConfig(**read_settings(path))
-    except TypeError as error:
-        raise ValueError(f"{path} is no training configuration: {error}") from error

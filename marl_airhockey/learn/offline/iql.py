@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from marl_airhockey.learn.layers import TwinLayers, linear_layers
+from marl_airhockey.learn.networks import TwinLayers, linear_layers
 from marl_airhockey.learn.offline.actor import Algorithm
 from marl_airhockey.learn.offline.config import OfflineConfig
 
@@ -39,7 +39,7 @@ class ImplicitQLearning(Algorithm):
         value = self.value(observation)[:, 0]
         advantage = target - value
         weight = torch.exp(self.config.temperature * advantage.detach())
-        density = self.log_density(observation, action)
+        density = self.log_density(self.actor(observation), action)
         side = torch.where(
             advantage > 0, self.config.expectile, 1.0 - self.config.expectile
         )

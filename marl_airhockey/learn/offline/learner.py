@@ -10,14 +10,12 @@ from pathlib import Path
 import torch
 
 from marl_airhockey.learn.engine import (
-    evaluate_policy,
-    make_logger,
+    evaluate_and_record,
     save_weights,
     training_threads,
 )
-from marl_airhockey.learn.grade import Metrics
-from marl_airhockey.learn.layers import plain_policy
-from marl_airhockey.learn.network import policy_card
+from marl_airhockey.learn.evaluate_policy import Metrics
+from marl_airhockey.learn.logs import RunLog
 from marl_airhockey.learn.offline.actor import Algorithm
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.offline.dataset import load_dataset
@@ -45,7 +43,7 @@ class Learner:
         world = build_world(config.scenario, 1, True, config.keywords)
         layout = world.observer.layout
         world.close()
-        self._card = policy_card(config, layout.labels)
+        self._card = config.card(layout.labels)
         files = [Path(path) for path in config.data]
         shape = config.seat, config.share, config.gamma, len(layout.centre)
         self._data = load_dataset(files, *shape)
@@ -61,14 +59,14 @@ class Learner:
             state = torch.load(run.folder / "last.pt", weights_only=True)
             self.model.load_state_dict(state["model"])
             self._optimizer.load_state_dict(state["optimizer"])
-        self._logger = make_logger(run.folder, run.progress.steps)
+        self._log = RunLog(run.folder, run.progress.steps)
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""
         try:
             return self._train()
         finally:
-            self._logger.close()
+            self._log.close()
 
     def _train(self) -> Metrics:
         run, row = self._run, self._run.latest
@@ -80,10 +78,10 @@ class Learner:
                 losses = self.descend(step)
             run.update_progress(last, self._config.learning_rate)
             for name, value in losses.items():
-                self._logger.record(f"train/{name}", value)
+                self._log.record(f"train/{name}", value)
             if run.evaluation_due or run.steps_left <= 0:
                 row = self._evaluate()
-            self._logger.dump(last)
+            self._log.dump(last)
         return row
 
     def descend(self, step: int) -> dict[str, float]:
@@ -108,14 +106,13 @@ class Learner:
 
     def policy(self) -> NumpyPolicy:
         """Return the policy as it is."""
-        model = self.model
         card = {**self._card, "algo": self._config.algo}
         card["steps"] = self._run.progress.steps
-        return plain_policy(model.actor, model.centre, model.unit, model.log_std, card)
+        return self.model.to_numpy(card)
 
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the evaluation's row."""
-        return evaluate_policy(self._run, self.policy(), self._logger, self._save)
+        return evaluate_and_record(self._run, self.policy(), self._log, self._save)
 
     def _save(self, name: str) -> None:
         """Write the policy, and all that it goes on from, under a name."""

@@ -1,4 +1,4 @@
-"""Grading of a policy in training: success at a task, scores in games."""
+"""Evaluation of a policy in training: success at a task, scores in games."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from collections.abc import Callable
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.learn.config import TrainConfig
 from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.registry import make_agent
 from marl_airhockey.world.build import Keywords
 
 EVAL_SEED = 1_000_000
 """First seed of the evaluations during training"""
 Metrics = dict[str, float]
-"""Named numbers; the first says how good the policy is, ``return`` breaks ties"""
+"""Named numbers; the first is the primary metric, ``return`` breaks ties"""
 DriverFactory = Callable[[bool], Driver]
 """Maker of the policy as a driver that acts by its mean (True) or samples (False)"""
 
 
-def grade(make: DriverFactory, config: RunConfig) -> Metrics:
+def evaluate_policy(make: DriverFactory, config: RunConfig) -> Metrics:
     """Evaluate a policy in training on the evaluation seeds."""
-    if isinstance(config, TrainConfig) and config.self_play:
+    if isinstance(config, SelfPlayConfig) and config.self_play:
         return _scores(make, config)
     return _success(make, config)
 
@@ -49,7 +49,7 @@ def _success(make: DriverFactory, config: RunConfig) -> Metrics:
     }
 
 
-def _scores(make: DriverFactory, config: TrainConfig) -> Metrics:
+def _scores(make: DriverFactory, config: SelfPlayConfig) -> Metrics:
     """Return shares of won games, a draw counting half; the ends alternate."""
     keywords: Keywords = {**config.keywords, "drivers": {}}
     score, margin = play_against(

@@ -1,0 +1,169 @@
+"""Slots: B worlds as one vector environment with a slot for each open seat of each."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+from typing import Any, Unpack
+
+import numpy as np
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.state import State
+from marl_airhockey.envs.seats import check_some_open
+from marl_airhockey.envs.spaces import action_space, observation_space
+from marl_airhockey.types import Array, Memory
+from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.observer import Observation
+from marl_airhockey.world.step_result import StepResult
+
+
+class SlotEnv:
+    """Vector environment of B x open seats, world by world, for one shared policy.
+
+    It has what learners need and depends on no learning library; `AirHockeyVecEnv` is
+    the same for stable-baselines3. Episodes restart immediately. Slots whose episode
+    ended get ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``,
+    ``first_shot`` and ``episode`` in their infos; all others share one empty dict.
+
+    Args:
+        scenario: Name of the scenario, or a scenario object.
+        num_worlds: Number of worlds, B.
+        forms: See `build.build_world`.
+        **keywords: See `build.build_world`.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Scenario,
+        num_worlds: int = 1,
+        forms: Collection[str] = (),
+        **keywords: Unpack[Keywords],
+    ) -> None:
+        self.world = build_world(scenario, num_worlds, True, keywords, forms)
+        check_some_open(self.world)
+        self.seats = len(self.world.open)
+        self.num_envs = num_worlds * self.seats
+        """Number of slots."""
+        self.observation_space = observation_space(self.world.observer)
+        self.action_space = action_space()
+        self.last_terms: dict[str, float] = {}
+        """Mean reward terms of the last step, by name."""
+        self.penalty: Callable[[Array, Array, Array], Array] | None = None
+        """Penalty (slots,) of actions (slots, 2), excess of limits (slots,) and ends of
+        episodes (slots,), which is subtracted from the rewards; None for none."""
+        self.ended = np.zeros(0, np.int64)
+        """Indices of the worlds that restarted in the last step."""
+        self._began = time.time()
+        self._nothing: dict[str, Any] = {}
+        self._returns = np.zeros(self.num_envs)
+        self._lengths = np.zeros(self.num_envs, np.int64)
+
+    def seed(self, seed: int) -> None:
+        """Give world i the seed + i at the next reset."""
+        self.world.seed(seed)
+
+    def reset(self) -> Any:
+        """Begin an episode in every world; return the observations (slots, ...)."""
+        self._returns[:], self._lengths[:] = 0.0, 0
+        return self.of_slots(self.world.reset())
+
+    def set_state(
+        self, state: State, memory: Memory | None = None, worlds: Array | None = None
+    ) -> Any:
+        """Continue from given states, see `World.set_state`; return observations."""
+        return self.of_slots(self.world.set_state(state, memory, worlds))
+
+    def step(self, actions: Array) -> tuple[Any, Array, Array, list[dict[str, Any]]]:
+        """Move all worlds by one control step.
+
+        Args:
+            actions: Actions (slots, 2), fractions of top speed, ego frames.
+
+        Returns:
+            Observations (slots, ...), rewards (slots,) float32, ends of episodes
+            (slots,) bool, and an info for each slot.
+
+        Raises:
+            ValueError: A wrong shape, or an element that is not finite.
+        """
+        given, shape = np.asarray(actions), (self.num_envs, 2)
+        if given.shape != shape:
+            raise ValueError(f"actions: expected shape {shape}, got {given.shape}")
+        every = self._of_worlds(given)
+        result = self.world.step(every)
+        reward = self._pick(result.reward).astype(np.float32)
+        self.last_terms = {k: float(v.mean()) for k, v in result.terms.items()}
+        self._returns += reward
+        self._lengths += 1
+        ended = result.terminated | result.truncated
+        done = self._done(ended)
+        if self.penalty is not None:
+            excess = self._pick(result.violation)[:, -1]
+            penalty = self.penalty(self._pick(every), excess, done)
+            reward -= penalty.astype(np.float32)
+            self.last_terms["action_penalty"] = -float(penalty.mean())
+        infos = [self._nothing] * self.num_envs
+        self.ended = np.flatnonzero(ended)
+        if result.final_observation is not None:
+            self._fill_infos(infos, np.flatnonzero(done), result)
+            self._returns[done], self._lengths[done] = 0.0, 0
+            self._restarted(self.ended, result)
+        return self.of_slots(result.observation), reward, done, infos
+
+    def _fill_infos(
+        self, infos: list[dict[str, Any]], slots: Array, result: StepResult
+    ) -> None:
+        """Replace the infos of slots (n,) whose episode ended."""
+        assert result.final_observation is not None
+        final = self.of_slots(result.final_observation)
+        success = self._pick(result.success)
+        for i in slots.tolist():
+            world = self._world(i)
+            infos[i] = {
+                "terminal_observation": _row(final, i),
+                "TimeLimit.truncated": bool(result.truncated[world]),
+                "is_success": bool(success[i]),
+                "first_shot": bool(result.first_shot[world]),
+                "episode": {
+                    "r": float(self._returns[i]),
+                    "l": int(self._lengths[i]),
+                    "t": time.time() - self._began,
+                },
+            }
+
+    def of_slots(self, observation: Observation) -> Any:
+        """Return the observations (slots, ...) of (B, seats, ...)."""
+        if isinstance(observation, np.ndarray):
+            return self._pick(observation)
+        return {k: self._pick(v) for k, v in observation.items()}
+
+    def _of_worlds(self, actions: Array) -> Array:
+        """Return the actions (B, seats, 2) of those of slots (slots, 2)."""
+        return actions.reshape(-1, self.seats, 2)
+
+    def _pick(self, rows: Array) -> Array:
+        """Return the rows (slots, ...) of (B, seats, ...)."""
+        return rows.reshape(self.num_envs, *rows.shape[2:])
+
+    def _done(self, ended: Array) -> Array:
+        """Return (slots,) of (B,)."""
+        return np.repeat(ended, self.seats)
+
+    def _world(self, slot: int) -> int:
+        """Return the index of a slot's world."""
+        return slot // self.seats
+
+    def _restarted(self, worlds: Array, last: StepResult) -> None:
+        """Take note that some worlds, by index, restarted after their last step."""
+        return None
+
+    def close(self) -> None:
+        """Close the physics."""
+        self.world.close()
+
+
+def _row(observations: Any, i: int) -> Any:
+    if isinstance(observations, dict):
+        return {name: value[i] for name, value in observations.items()}
+    return observations[i]

@@ -1,0 +1,92 @@
+"""Settings of runs in files: read, refused, with the names of earlier versions."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.learn.run_config import RunConfig
+from marl_airhockey.policies.runs import check_run_format
+from marl_airhockey.policies.trust import is_trusted_code, require_trust
+from marl_airhockey.registry import runs_code
+
+C = TypeVar("C", bound=RunConfig)
+RENAMED = {
+    "mirror": "self_play_fraction",
+    "script_share": "scripted_fraction",
+    "priority": "opponent_sampling_exponent",
+    "highest_rate": "max_learning_rate",
+}
+"""Names of settings in this version by those of earlier ones"""
+PACE = "opponent_pace"
+"""Earlier setting: the low end of ``opponent_speed_range``, whose high end was 1"""
+
+
+def renamed(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings by the names of this version."""
+    found = {RENAMED.get(name, name): value for name, value in settings.items()}
+    if PACE in found:
+        found["opponent_speed_range"] = [found.pop(PACE), 1.0]
+    return found
+
+
+def check_names(kind: type[RunConfig], settings: Mapping[str, Any]) -> None:
+    """Refuse settings that a kind of configuration does not have.
+
+    Raises:
+        ValueError: An unknown name; the message has the known ones.
+    """
+    known = [f.name for f in fields(kind)]
+    for name in settings:
+        if name not in known:
+            raise ValueError(unknown_name("setting", name, known))
+
+
+def read_settings(path: Path) -> dict[str, Any]:
+    """Return the settings in the ``config.toml`` of a run.
+
+    Raises:
+        ValueError: Not such a file, one of a run of another format, or one that names
+            Python code and is not trusted.
+    """
+    try:
+        data = tomllib.loads(path.read_text())
+    except (OSError, tomllib.TOMLDecodeError) as error:
+        raise ValueError(f"{path} is no training configuration: {error}") from error
+    found = data.pop("format", 1)
+    if "scenario" in data:
+        check_run_format(path.parent, found)
+    _refuse_code(path, data)
+    return renamed(data)
+
+
+def load_config(kind: type[C], path: Path) -> C:
+    """Read the configuration that `RunConfig.to_toml` wrote.
+
+    Args:
+        kind: Class of the configuration.
+        path: Path of a run's ``config.toml``.
+
+    Raises:
+        ValueError: See `read_settings`, or a run of another algorithm.
+    """
+    data, names = read_settings(path), {f.name for f in fields(kind)}
+    if "algo" in data and "algo" not in names:
+        raise ValueError(f"{path.parent}: a run of {data['algo']}, not of PPO")
+    try:
+        return kind(**data)
+    except TypeError as error:
+        raise ValueError(f"{path} is no training configuration: {error}") from error
+
+
+def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
+    """Ask before a configuration, maybe somebody else's, runs code that it names."""
+    named = [data.get("scenario", ""), *dict(data.get("drivers", {})).values()]
+    named += [*data.get("opponents", []), *data.get("rivals", [])]
+    found = [t for t in map(str, named) if runs_code(t) and not is_trusted_code(t)]
+    if found:
+        require_trust(path, code=f"the name of Python code, {found[0]}")

@@ -1,0 +1,44 @@
+"""Weights of torch as NumPy policies; torch itself is not imported."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+
+
+def policy_of_weights(
+    weights: Mapping[str, Any],
+    layers: Sequence[str],
+    scale: tuple[Any, Any],
+    log_std: Any,
+    card: Mapping[str, Any],
+) -> NumpyPolicy:
+    """Return linear layers, with rectifiers between them, as a NumPy policy.
+
+    Args:
+        weights: Tensors by name, as in a ``state_dict``.
+        layers: Names of the layers: ``NAME.weight`` and ``NAME.bias`` are theirs.
+        scale: Centre and unit (D,) of the flat observation, tensors; goals that follow
+            it are taken as they are.
+        log_std: Log standard deviation (2,) of the actions, a tensor.
+        card: Card of the policy, see `NumpyPolicy`.
+
+    Raises:
+        KeyError: There is no such layer.
+    """
+    pairs = [
+        (_array(weights[f"{name}.weight"]), _array(weights[f"{name}.bias"]))
+        for name in layers
+    ]
+    centre, unit = map(_array, scale)
+    goals = (0, pairs[0][0].shape[1] - len(centre))
+    unit = np.pad(unit, goals, constant_values=1.0)
+    return NumpyPolicy(pairs, np.pad(centre, goals), unit, _array(log_std), card)
+
+
+def _array(tensor: Any) -> Any:
+    return np.array(tensor.detach().cpu().numpy(), np.float32)
