@@ -11,7 +11,9 @@ if not (_here / "scenarios").is_dir():
     __path__.append(str(_here.parent))
 
 from marl_airhockey.envs.registration import register_all  # noqa: E402
-from marl_airhockey.experiment import evaluate, league, train  # noqa: E402
+from marl_airhockey.evaluation.evaluate import evaluate  # noqa: E402
+from marl_airhockey.evaluation.league import league  # noqa: E402
+from marl_airhockey.learn.train import train  # noqa: E402
 from marl_airhockey.make import (  # noqa: E402
     GameFinder,
     env,

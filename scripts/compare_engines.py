@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from marl_airhockey.learn.ppo_config import preset
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 
 ENGINES = "torch", "sb3"
 
@@ -28,7 +28,7 @@ def measure(scenario: str, steps: int, seed: int, engine: str) -> tuple[float, f
     """Train once; return the CPU-seconds and the success at the end."""
     changes = {"total_steps": steps, "seed": seed, "engine": engine, "evaluations": 1}
     with tempfile.TemporaryDirectory() as folder:
-        row = train(preset(scenario, changes), Path(folder) / "run")
+        row = run_training(preset(scenario, changes), Path(folder) / "run")
     return row["learning_cpu_seconds"], row["success"]
 
 

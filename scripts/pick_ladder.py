@@ -21,7 +21,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.evaluation.league import play_league
+from marl_airhockey.evaluation.league import league
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.learn.export import export_policy
 from marl_airhockey.policies.load import load_policy
@@ -63,7 +63,7 @@ def main(
 ) -> None:
     """Play the league, pick the rungs, write them with their cards, print the table."""
     players = {str(path): load_policy(path) for path in checkpoints}
-    standings = play_league(game, players, games)
+    standings = league(game, players, games=games)
     standings.save(out)
     chain = find_chain(standings, rungs)
     low_high = standings.score_intervals

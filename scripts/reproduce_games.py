@@ -30,7 +30,7 @@ from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play_config import OPPONENTS
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
 from marl_airhockey.world.build import Keywords
@@ -43,7 +43,7 @@ GAMES, SEED = 400, 5_000_000
 def train_seed(game: str, seed: int, folder: Path) -> None:
     """Train one seed, or resume its training."""
     begun = (folder / "config.toml").exists()
-    train(None if begun else preset(game, {"seed": seed}), folder)
+    run_training(None if begun else preset(game, {"seed": seed}), folder)
 
 
 def checkpoint(folder: Path, share: float) -> Path:

@@ -174,7 +174,12 @@ def play_script(game: str, name: str) -> Row:
     """Return the row of a team of scripts."""
     mate = {"paddle_1": name, **GAMES[game].get("drivers", {})}
     result = evaluate(
-        ah.make_agent(name), name, game, EPISODES, keywords={"drivers": mate}
+        ah.make_agent(name),
+        game,
+        episodes=EPISODES,
+        name=name,
+        exact=True,
+        drivers=mate,
     )
     values = game, name, "", 0, result.success, result.returns, 0.0
     return dict(zip(FIELDS, values, strict=True))

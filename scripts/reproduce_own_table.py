@@ -1,6 +1,6 @@
 """Compare policies that were trained for one table with those trained for all.
 
-    airhockey fit play/*.csv --base ur5e ... --out lab.toml      # see docs/teleop.md
+    airhockey fit-table play/*.csv --base ur5e ... --out lab.toml  # see docs/teleop.md
     python scripts/reproduce_own_table.py lab.toml --lab-seed 3 --tasks juggle
 
 The table is the virtual lab's, whose laws nobody is told but this script: it prints
@@ -42,7 +42,7 @@ from marl_airhockey.evaluation.evaluate import (
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.world import LabWorld
 from marl_airhockey.learn.ppo_config import preset
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.world.build import Keywords, build_driven_world
 
@@ -62,7 +62,7 @@ def train_one(task: str, profile: str, seed: int, folder: Path) -> Path:
     place = folder / f"{task}-{Path(profile).stem}-{seed}"
     changes = {"profile": profile, "options": OPTIONS, "seed": seed}
     known = (place / "config.toml").exists()
-    train(None if known else preset(task, changes), place)
+    run_training(None if known else preset(task, changes), place)
     print(place, flush=True)
     return place
 
@@ -106,7 +106,9 @@ def print_result(task: str, found: Comparison) -> None:
 
 
 def main(
-    profile: Annotated[Path, typer.Argument(help="That `airhockey fit` has written.")],
+    profile: Annotated[
+        Path, typer.Argument(help="That `airhockey fit-table` has written.")
+    ],
     lab_seed: Annotated[int, typer.Option(help="Of the lab that was measured.")] = 0,
     tasks: Annotated[str, typer.Option(help="Separated by commas.")] = "juggle",
     seeds: Annotated[int, typer.Option(help="Policies of each profile.")] = 5,

@@ -30,7 +30,7 @@ from marl_airhockey.data.record import record_episodes
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 
 PAPER = {
@@ -71,9 +71,11 @@ def train_cell(task: str, algo: str, seed: int, folder: Path) -> Row:
     """Train one cell and return its row."""
     config = offline_config(algo, [folder / f"data-{task}"], {"seed": seed})
     place = folder / f"{task}-{algo}-{seed}"
-    row = train(None if (place / "config.toml").exists() else config, place)
+    row = run_training(None if (place / "config.toml").exists() else config, place)
     policy = load_policy(place / "last.npz")
-    found = evaluate(policy, algo, task, EPISODES, keywords=config.keywords)
+    found = evaluate(
+        policy, task, episodes=EPISODES, name=algo, exact=True, **config.keywords
+    )
     minutes = round(row["cpu_seconds"] / 60, 2)
     values = task, algo, seed, found.success, found.returns, int(row["steps"]), minutes
     return dict(zip(FIELDS, values, strict=True))

@@ -37,7 +37,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.plots import plot_seed_curves
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.sensing.simulated_camera import SENSED
 from marl_airhockey.world.build import Keywords
@@ -120,7 +120,7 @@ def train_seed(config: PPOConfig, variant: str, folder: Path) -> tuple[Row, Rows
         variant: name of what it changes.
         folder: of the run; one that was cut off is gone on with.
     """
-    train(None if (folder / "config.toml").exists() else config, folder)
+    run_training(None if (folder / "config.toml").exists() else config, folder)
     values = config.scenario, config.profile, variant, config.seed
     key = dict(zip(KEY, values, strict=True))
     row: Row = {**key, "recipe": recipe(config), **measure(config, folder)}
@@ -155,7 +155,14 @@ def measure(config: PPOConfig, folder: Path) -> Row:
     row: Row = {}
     for name, (mean, episodes, keywords) in cases.items():
         policy = load_policy(folder / "last.npz", deterministic=mean)
-        found = evaluate(policy, name, config.scenario, episodes, keywords=keywords)
+        found = evaluate(
+            policy,
+            config.scenario,
+            episodes=episodes,
+            name=name,
+            exact=True,
+            **keywords,
+        )
         row[name] = round(found.success, 4)
         if name == "success":
             row["first_shot"] = round(found.first_shot, 4)
@@ -191,7 +198,15 @@ def run_of(row: Row) -> tuple[str, ...]:
 def floors(task: str, keywords: Keywords) -> dict[str, float]:
     """Return the success of drivers without skill, by name."""
     return {
-        name: evaluate(make_agent(name), name, task, EPISODES, 0, keywords).success
+        name: evaluate(
+            make_agent(name),
+            task,
+            episodes=EPISODES,
+            seed=0,
+            name=name,
+            exact=True,
+            **keywords,
+        ).success
         for name in ("still", "random", "sticky")
     }
 

@@ -113,11 +113,11 @@ def touch_run(tmp_path_factory):
     from runs import SMALL
 
     from marl_airhockey.learn.ppo_config import preset
-    from marl_airhockey.learn.train import train
+    from marl_airhockey.learn.train import run_training
 
     folder = tmp_path_factory.mktemp("run") / "touch-0"
     seen = []
-    train(
+    run_training(
         preset("touch", {**SMALL, "total_steps": 98_304}),
         folder,
         lambda done, total, row: seen.append((done, total)),
@@ -146,8 +146,8 @@ def sb3_run(tmp_path_factory):
     from runs import SMALL
 
     from marl_airhockey.learn.ppo_config import preset
-    from marl_airhockey.learn.train import train
+    from marl_airhockey.learn.train import run_training
 
     folder = tmp_path_factory.mktemp("sb3") / "touch-0"
-    train(preset("touch", {**SMALL, "engine": "sb3"}), folder)
+    run_training(preset("touch", {**SMALL, "engine": "sb3"}), folder)
     return folder

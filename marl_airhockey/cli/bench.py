@@ -12,14 +12,12 @@ from rich.table import Table
 from marl_airhockey.cli.options import (
     AsJson,
     Workers,
-    app,
     console,
 )
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
 
 
-@app.command("bench")
 def bench_environments(
     scenario: Annotated[str, typer.Option(help="Comma-separated.")] = "juggle",
     backend: Annotated[str, typer.Option(help="Comma-separated.")] = "numba,pymunk",

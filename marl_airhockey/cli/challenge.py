@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from marl_airhockey import __version__
-from marl_airhockey.cli.options import AsJson, Trusting, app, console
+from marl_airhockey.cli.options import AsJson, Trusting, console
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.card import Result
@@ -20,7 +20,6 @@ from marl_airhockey.evaluation.challenge import (
 )
 
 
-@app.command()
 def challenge(
     policy: Annotated[
         str,

@@ -15,7 +15,6 @@ from marl_airhockey.cli.options import (
     Options,
     Profile,
     Trusting,
-    app,
     as_trained_unless_given,
     console,
     environment,
@@ -26,7 +25,6 @@ from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 
-@app.command()
 def crossplay(
     scenario: Annotated[str, typer.Argument(help="A game of teams of two or more.")],
     players: Annotated[list[str], typer.Argument(help="Drivers and policies.")],

@@ -22,7 +22,6 @@ from marl_airhockey.cli.options import (
     Scenario,
     Trusting,
     Workers,
-    app,
     as_trained_unless_given,
     console,
     environment,
@@ -44,7 +43,6 @@ FLOORS = ("still", "random", "sticky")
 """Drivers without skill that results are compared with."""
 
 
-@app.command("evaluate")
 def evaluate_driver(
     driver: Annotated[
         list[str],
@@ -99,7 +97,17 @@ def evaluate_driver(
         task = progress.add_task(scenario, total=len(entries), note="")
         for name, entry in entries:
             progress.update(task, note=name)
-            results.append(evaluate(entry, name, scenario, episodes, seed, keywords))
+            results.append(
+                evaluate(
+                    entry,
+                    scenario,
+                    episodes=episodes,
+                    seed=seed,
+                    name=name,
+                    exact=True,
+                    **keywords,
+                )
+            )
             progress.advance(task)
     runs = OverRuns.of(results[: len(players)]) if len(players) > 1 else None
     if as_json:

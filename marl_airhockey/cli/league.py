@@ -22,7 +22,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
-from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, play_league
+from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, league
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
@@ -37,7 +37,7 @@ SCRIPTS = (
 """Scripts that play if no players are given."""
 
 
-def league(
+def play_league(
     scenario: Annotated[str, typer.Argument(help="A game of two sides or more.")],
     players: Annotated[
         list[str] | None,
@@ -76,9 +76,13 @@ def league(
     )
     with bar() as progress:
         task = progress.add_task(f"league of {len(entrants)}", total=1.0, note="")
-        standings = play_league(
-            *(scenario, entrants, games, seed, keywords),
-            lambda share: progress.update(task, completed=share),
+        standings = league(
+            scenario,
+            entrants,
+            games=games,
+            seed=seed,
+            report=lambda share: progress.update(task, completed=share),
+            **keywords,
         )
     files = standings.save(out)
     responses: dict[str, list[float]] = {}

@@ -10,7 +10,6 @@ from rich.table import Table
 
 from marl_airhockey.cli.options import (
     AsJson,
-    app,
     console,
 )
 from marl_airhockey.core.errors import unknown_name
@@ -19,7 +18,6 @@ from marl_airhockey.envs.describe import describe, describe_profile, summary
 from marl_airhockey.registry import plugin_names, runs_code, scenario_names
 
 
-@app.command("list")
 def list_scenarios(
     scenario: Annotated[
         str | None, typer.Argument(help="Describe this scenario or profile.")

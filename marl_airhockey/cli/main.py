@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -18,6 +19,7 @@ from marl_airhockey.cli import (
     crossplay,
     data,
     evaluate,
+    fit,
     lab,
     league,
     listing,
@@ -31,7 +33,6 @@ from marl_airhockey.cli import (
     warm,
     watch,
 )
-from marl_airhockey.cli.options import app
 from marl_airhockey.plugins import author_files
 
 
@@ -41,31 +42,45 @@ def _tell_version(given: bool) -> None:
         raise typer.Exit
 
 
-# Importing these modules adds their commands to the application.
-__all__ = [
-    "bench",
-    "challenge",
-    "crossplay",
-    "evaluate",
-    "listing",
-    "main",
-    "new",
-    "train",
-    "trials",
-    "warm",
-    "watch",
-]
-app.command()(league.league)
-app.command()(play.play)
-app.command()(teleop.teleop)
-app.command()(transfer.transfer)
-app.command()(transfer.fit)
-app.add_typer(data.data, name="data")
-app.add_typer(study.study, name="study")
+app = typer.Typer(
+    help="Air hockey for robot learning and multi-agent RL.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+COMMANDS: dict[str, Callable[..., None]] = {
+    "list": listing.list_scenarios,
+    "train": train.train,
+    "evaluate": evaluate.evaluate_driver,
+    "watch": watch.watch,
+    "play": play.play,
+    "league": league.play_league,
+    "crossplay": crossplay.crossplay,
+    "challenge": challenge.challenge,
+    "export": train.export,
+    "demo": train.demo,
+    "transfer": transfer.transfer,
+    "fit": fit.fit,
+    "fit-table": fit.fit_table,
+    "trials": trials.trials,
+    "teleop": teleop.teleop,
+    "bench": bench.bench_environments,
+    "warm": warm.warm,
+    "new": new.new,
+}
+"""Functions of the commands, by name"""
+GROUPS = {
+    "data": data.data,
+    "study": study.study,
+    "calibrate": calibrate.calibrate,
+    "lab": lab.lab,
+}
+"""Groups of commands, by name"""
+for name, function in COMMANDS.items():
+    app.command(name)(function)
 calibrate.calibrate.command()(calibrate_delay.delay)
 calibrate.calibrate.command()(calibrate_arm.arm)
-app.add_typer(calibrate.calibrate, name="calibrate")
-app.add_typer(lab.lab, name="lab")
+for name, group in GROUPS.items():
+    app.add_typer(group, name=name)
 
 
 @app.callback()

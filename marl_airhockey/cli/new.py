@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli.options import app, console
+from marl_airhockey.cli.options import console
 from marl_airhockey.registry import agent_names, plugin_names, scenario_names
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -23,7 +23,6 @@ class Kind(StrEnum):
     DRIVER = "driver"
 
 
-@app.command("new")
 def new(
     kind: Annotated[Kind, typer.Argument(help="What to write.")],
     name: Annotated[str, typer.Argument(help="Name of it, like my_task.")],

@@ -25,11 +25,6 @@ if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
     from marl_airhockey.learn.evaluate_policy import Metrics
 
-app = typer.Typer(
-    help="Air hockey for robot learning and multi-agent RL.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-)
 console = Console()
 
 Scenario = Annotated[
@@ -43,8 +38,8 @@ Backend = Annotated[str, typer.Option(help="Physics.")]
 Profile = Annotated[
     str | None,
     typer.Option(
-        help="ideal, ur5e, gantry, or a file of airhockey fit; by default that of the "
-        "policy's training, else ideal."
+        help="ideal, ur5e, gantry, or a file of airhockey fit-table; by default that "
+        "of the policy's training, else ideal."
     ),
 ]
 Observe = Annotated[
@@ -205,8 +200,8 @@ def measure_of(row: dict[str, float]) -> str:
 
 
 def train_with_progress(config: AnyConfig | None, folder: Path) -> Metrics:
-    """Call `learn.train.train` with a progress bar."""
-    from marl_airhockey.learn.train import train
+    """Call `learn.train.run_training` with a progress bar."""
+    from marl_airhockey.learn.train import run_training
 
     with bar() as progress:
         task = progress.add_task(folder.name, total=None, note="")
@@ -217,4 +212,4 @@ def train_with_progress(config: AnyConfig | None, folder: Path) -> Metrics:
             note = f"{name} {row[name]:.2f}" if row else ""
             progress.update(task, completed=done, total=total, note=note)
 
-        return train(config, folder, report)
+        return run_training(config, folder, report)

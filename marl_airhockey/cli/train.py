@@ -17,7 +17,6 @@ from marl_airhockey.cli.options import (
     Physics,
     Trusting,
     Workers,
-    app,
     console,
     measure_of,
     physics_of,
@@ -26,14 +25,13 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
-from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario
+from marl_airhockey.registry import DEFAULT_BACKEND
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
     from marl_airhockey.learn.ppo_config import PPOConfig
 
 
-@app.command()
 def train(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario.")] = "",
     seed: Annotated[int, typer.Option(help="Seed of worlds and network.")] = 0,
@@ -77,8 +75,9 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a policy with PPO and its preset, or by another --algo; or --resume."""
-    from marl_airhockey.learn.algorithms import PPO, make_config
+    from marl_airhockey.learn.algorithms import make_config
     from marl_airhockey.learn.ppo_config import PPOConfig
+    from marl_airhockey.learn.train import default_folder
 
     given = {
         "physics": physics_of(physics) or None,
@@ -104,9 +103,7 @@ def train(
     config = make_config(algo, scenario, data or [], changes)
     if isinstance(config, PPOConfig) and steps is not None and not as_json:
         _tell_updates(steps, config, changes)
-    kind = "" if algo == PPO else f"{algo}-"
-    name = find_scenario(config.scenario).name
-    _train(config, out or Path("runs") / f"{name}-{kind}{config.seed}", as_json)
+    _train(config, out or default_folder(config), as_json)
 
 
 def _tell_updates(steps: int, config: PPOConfig, changes: dict[str, Any]) -> None:
@@ -169,7 +166,6 @@ def _is_finished(folder: Path) -> bool:
     return state.exists() and Progress.load(state).steps >= config.total_steps
 
 
-@app.command()
 def export(
     run: Annotated[Path, typer.Argument(help="Folder of a training run.")],
     out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
@@ -181,7 +177,7 @@ def export(
     """Freeze a trained policy into one small file, .npz or .onnx, with a card."""
     if not (run / "config.toml").exists():
         raise ValueError(f"{run}: there is no training run; name the folder of one")
-    require("stable_baselines3", "train")
+    require("torch", "train")
     from marl_airhockey.learn.export import export_policy
 
     console.print_json(json.dumps(dict(export_policy(run, out, checkpoint).card)))
@@ -193,7 +189,6 @@ def export(
     )
 
 
-@app.command()
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for what it makes.")] = Path(
         "runs/demo"
@@ -205,7 +200,7 @@ def demo(
     ] = None,
 ) -> None:
     """Train a paddle to juggle, measure it, and show what it learned."""
-    require("stable_baselines3", "train")
+    require("torch", "train")
     from marl_airhockey.learn.demo import run_demo
 
     with bar() as progress:

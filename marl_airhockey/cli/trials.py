@@ -18,7 +18,6 @@ from marl_airhockey.cli.options import (
     Physics,
     Profile,
     Trusting,
-    app,
     as_trained_unless_given,
     console,
     environment,
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
 STARTS = "starts.csv"
 
 
-@app.command()
 def trials(
     policies: Annotated[
         list[str],

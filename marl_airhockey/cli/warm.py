@@ -10,13 +10,12 @@ from typing import Annotated
 
 import typer
 
-from marl_airhockey.cli.options import Backend, app
+from marl_airhockey.cli.options import Backend
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.registry import DEFAULT_BACKEND, find_scenario, scenario_names
 from marl_airhockey.world.build import Keywords, compile_world
 
 
-@app.command("warm")
 def warm(
     scenarios: Annotated[
         list[str] | None, typer.Argument(help="Scenarios; all if none are given.")

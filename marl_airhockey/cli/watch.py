@@ -18,7 +18,6 @@ from marl_airhockey.cli.options import (
     Profile,
     Scenario,
     Trusting,
-    app,
     as_trained_unless_given,
     console,
     environment,
@@ -33,7 +32,6 @@ from marl_airhockey.core.recording import SUFFIX
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 
-@app.command()
 def watch(
     driver: Annotated[
         str, typer.Argument(help="A driver's name, a policy's path, or a recording.")

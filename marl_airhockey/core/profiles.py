@@ -182,7 +182,7 @@ def find_profile(name: str) -> Profile:
 
 
 def load_profile(path: Path) -> Profile:
-    """Read a profile from a TOML file, such as ``airhockey fit --base ur5e`` writes.
+    """Read a profile from a TOML file, such as ``airhockey fit-table`` writes.
 
     Raises:
         ValueError: no such file, an unknown base or parameter, or a range that is none.

@@ -57,7 +57,7 @@ class Trajectories:
     def write(self, path: Path) -> None:
         """Write a CSV with a row a picture; what was not seen is left empty.
 
-        `airhockey fit` reads it.
+        `airhockey fit-table` reads it.
         """
         partial = path.with_suffix(".part")
         with partial.open("w", newline="") as file:

@@ -116,7 +116,15 @@ def _play(
             score = float(found[0])
             ends = interval(score, games)
             return Result(scenario, profile, rival, shown, score, *ends, 0.0, "", "")
-        task = evaluate(driver, shown, scenario, episodes, SEED, {"profile": profile})
+        task = evaluate(
+            driver,
+            scenario,
+            episodes=episodes,
+            seed=SEED,
+            name=shown,
+            exact=True,
+            profile=profile,
+        )
     except ValueError as error:
         return missing(str(error))
     success, ends = task.success, task.success_interval

@@ -106,7 +106,15 @@ def play_together(
             team = {f"paddle_{k}": mate for k in mates}
             drivers = {**keywords.get("drivers", {}), **team}
             seated: Keywords = {**keywords, "drivers": drivers}
-            found = evaluate(player, name, scenario, episodes, seed, seated)
+            found = evaluate(
+                player,
+                scenario,
+                episodes=episodes,
+                seed=seed,
+                name=name,
+                exact=True,
+                **seated,
+            )
             returns[i, j], success[i, j] = found.returns, found.success
             report(i * len(players) + j + 1)
     return CrossPlay(scenario, tuple(players), episodes, returns, success)

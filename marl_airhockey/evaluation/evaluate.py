@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Unpack
 
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.evaluation.as_trained import as_trained, seen_in
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_driven_world
 from marl_airhockey.world.world import World
@@ -70,30 +72,42 @@ class EvaluationResult:
 
 
 def evaluate(
-    driver: Driver,
-    name: str,
-    scenario: str | Scenario,
+    player: object,
+    scenario: str | Scenario | None = None,
+    *,
     episodes: int = 200,
     seed: int = TEST_SEED,
-    keywords: Keywords | None = None,
+    name: str | None = None,
+    exact: bool = False,
+    **keywords: Unpack[Keywords],
 ) -> EvaluationResult:
-    """Let a driver play some episodes at ``paddle_0``, all at once, and measure it.
+    """Let a player play episodes at ``paddle_0`` and measure it.
 
-    On a real table they follow each other.
+    What is not given is that of a policy's training: scenario, options, profile,
+    observations, control_dt. The result names them. All episodes are played in one
+    batch; on a real table they follow each other.
 
     Args:
-        driver: driver that plays.
-        name: name of the driver in the result.
-        scenario: name of the scenario, or a scenario object.
-        episodes: number of episodes; episode i is the first of world i, with seed + i.
-        seed: seed of the first episode.
-        keywords: keywords of the environment, drivers of other seats among them; see
+        player: Driver, or what makes one, see `registry.make_agent`.
+        scenario: Scenario, see `registry.find_scenario`; None for that of training.
+        episodes: Number of episodes; episode i is the first of world i, with seed + i.
+        seed: Seed of the first episode; training never sees those from 2,000,000 on.
+        name: Name of the player in the result; None for its own.
+        exact: Whether keywords that are not given have their defaults instead.
+        **keywords: Keywords of the environment, drivers of other seats among them; see
             `build_world`.
 
     Raises:
-        ValueError: a seat without a driver, or a reward term that is nan, named.
+        ValueError: A seat without a driver, one that does not fit, or a reward term
+            that is nan, named.
     """
-    keywords = keywords if keywords is not None else {}
+    driver = make_agent(player)
+    name = name or name_of(player, driver)
+    if not exact:
+        scenario, keywords = as_trained({name: driver}, scenario, keywords)
+        driver = seen_in(driver, keywords)
+    if scenario is None:
+        raise ValueError("scenario: say what the driver is to play")
     if episodes < 1:
         raise ValueError(f"episodes: {episodes} must be at least 1")
     name_of_backend = keywords.get("backend", DEFAULT_BACKEND)
@@ -131,6 +145,13 @@ def evaluate(
         drivers={k: str(v) for k, v in keywords.get("drivers", {}).items()},
         seed=seed,
     )
+
+
+def name_of(player: object, driver: Driver) -> str:
+    """Return the name of a player in results: its own text, or its driver's."""
+    if isinstance(player, (str, Path)):
+        return str(player)
+    return str(getattr(driver, "source", type(driver).__name__))
 
 
 class EpisodeStatistics:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations, permutations
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.evaluation.as_trained import as_trained, seen_in
 from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.policies.runs import policies_of
+from marl_airhockey.registry import make_agent
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 
@@ -22,40 +24,49 @@ BATCH = 4096
 """Most games in one batch"""
 
 
-def play_league(
+def league(
     scenario: str,
-    players: Mapping[str, Driver],
+    players: Mapping[str, object] | Sequence[str],
+    *,
     games: int = 100,
     seed: int = LEAGUE_SEED,
-    keywords: Keywords | None = None,
     report: Callable[[float], None] = lambda share: None,
+    **keywords: Unpack[Keywords],
 ) -> Standings:
-    """Let every player play every other.
+    """Let every player play every other and rate them.
 
-    In games of more than two sides all comparisons of places count, as a Plackett-Luce
-    model is fitted by all pairs of its rankings (Azari Soufiani and others, 2013).
+    What is not given is that of the policies' training, which must agree. In games of
+    more than two sides all comparisons of ranks count, as a Plackett-Luce model is
+    fitted by all pairs of its rankings (Azari Soufiani and others, 2013).
 
     Args:
-        scenario: name of a game of two sides or more.
-        players: drivers by name, two at least.
-        games: number of games of each pair, on average if there are more than two
+        scenario: Name of a game of two sides or more.
+        players: Players by name, see `registry.make_agent`, two at least; or their
+            names alone.
+        games: Number of games of each pair, on average if there are more than two
             sides; of two, they change ends at half of them.
-        seed: seed of the first game.
-        keywords: keywords of the environment.
-        report: called again and again with the share of the games that is played.
+        seed: Seed of the first game.
+        report: Function that is called with the share of the games that is played.
+        **keywords: Keywords of the environment.
 
     Raises:
-        ValueError: a single player, an odd number of games, or a scenario without
+        ValueError: A single player, an odd number of games, or a scenario without
             sides that play against each other.
     """
-    count = len(players)
+    if isinstance(players, str):
+        raise ValueError(f"players: a list of names is expected, got {players!r}")
+    named = players if isinstance(players, Mapping) else {n: n for n in players}
+    drivers = {name: make_agent(player) for name, player in named.items()}
+    _, keywords = as_trained(drivers, scenario, keywords)
+    drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
+    count = len(drivers)
     if count < 2:
         raise ValueError("a league needs at least two players, of different names")
     if games < 2 or games % 2:
         raise ValueError(
             f"games: {games} must be an even number above 0, as ends change at half"
         )
-    scene = scenario_of(scenario, keywords or {}).scene
+    scene = scenario_of(scenario, keywords).scene
     sides = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
     lineups = lineups_of(count, max(sides, 2), games, seed)
     batches = []
@@ -67,14 +78,14 @@ def play_league(
         ) -> None:
             report((done + share * more) / len(lineups))
 
-        those = list(players.values()), some, seed + first, keywords
+        those = list(drivers.values()), some, seed + first, keywords
         batches.append(play_games(scenario, *those, share_of_all))
     results = GameResults.joined(batches)
     wins, draws, margin = compared(results, lineups, count)
     low, ratings, high = _ratings(wins, draws, sides - 1, seed)
     spread = np.stack([low, high], -1)
     return Standings(
-        scenario, tuple(players), games, wins, draws, margin, ratings, spread
+        scenario, tuple(drivers), games, wins, draws, margin, ratings, spread
     )
 
 

@@ -8,7 +8,7 @@ from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.settings import load_config
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
 from marl_airhockey.world.build import Keywords
@@ -53,7 +53,7 @@ def best_response(
         only = {"opponents": [player], "rivals": [player]}
         alone = {"self_play_fraction": 0.0, "scripted_fraction": 1.0, "snapshots": 1}
         length = {"total_steps": steps, "seed": seed, "evaluations": 4}
-        train(preset(scenario, {**only, **alone, **length}), folder, report)
+        run_training(preset(scenario, {**only, **alone, **length}), folder, report)
     response, rivals = load_policy(folder / "last.npz"), [make_agent(player)]
     keywords: Keywords = {"backend": "numba"}
     score, _ = play_against(scenario, response, rivals, GAMES, SEED, keywords)

@@ -13,7 +13,7 @@ from marl_airhockey.evaluation.watch import show_episodes
 from marl_airhockey.learn.plots import plot_learning_curve
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.run import ProgressCallback
-from marl_airhockey.learn.train import train, versions
+from marl_airhockey.learn.train import run_training, versions
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
 
@@ -46,10 +46,12 @@ def run_demo(
         shutil.rmtree(folder)
     config = preset(scenario)
     steps = steps or min(config.total_steps, MOST_STEPS)
-    last = train(replace(config, total_steps=steps), folder, report)
+    last = run_training(replace(config, total_steps=steps), folder, report)
     policy = load_policy(folder)
     drivers = {name: make_agent(name) for name in BESIDE} | {"learned": policy}
-    results = [evaluate(d, name, scenario) for name, d in drivers.items()]
+    results = [
+        evaluate(d, scenario, name=name, exact=True) for name, d in drivers.items()
+    ]
     files = {
         "learning curve": out / "learning_curve.png",
         "video": out / f"{scenario}.gif",

@@ -31,11 +31,12 @@ def _success(make: DriverFactory, config: RunConfig) -> Metrics:
     mean, sampled = (
         evaluate(
             make(deterministic),
-            "training",
             config.scenario,
-            config.eval_episodes,
-            EVAL_SEED,
-            config.keywords,
+            episodes=config.eval_episodes,
+            seed=EVAL_SEED,
+            name="training",
+            exact=True,
+            **config.keywords,
         )
         for deterministic in (True, False)
     )

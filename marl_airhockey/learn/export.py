@@ -83,7 +83,13 @@ def _load_last(run: Path) -> NumpyPolicy:
 
 def _episodes(policy: Policy, config: PPOConfig) -> dict[str, Any]:
     result = evaluate(
-        policy, "frozen", config.scenario, EPISODES, TEST_SEED, config.keywords
+        policy,
+        config.scenario,
+        episodes=EPISODES,
+        seed=TEST_SEED,
+        name="frozen",
+        exact=True,
+        **config.keywords,
     )
     low, high = result.success_interval
     return {"success": result.success, "low": low, "high": high, "episodes": EPISODES}

@@ -10,33 +10,97 @@ from __future__ import annotations
 import json
 import platform
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
+from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
-from marl_airhockey.learn.algorithms import AnyConfig, load_any_config
+from marl_airhockey.learn.algorithms import (
+    PPO,
+    AnyConfig,
+    load_any_config,
+    make_config,
+)
 from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
+from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.trust import trust_code
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import find_scenario, make_agent
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """Result of a training run."""
+
+    folder: Path
+    """Folder of the run; as a player, its best policy"""
+    steps: int
+    """Steps of single worlds"""
+    metrics: dict[str, float]
+    """Last row of ``evaluations.csv``: "success" or "score", "return" and so on"""
+
+    def policy(self, deterministic: bool = True) -> Driver:
+        """Return the best policy as a driver."""
+        return load_policy(self.folder, deterministic)
 
 
 def train(
+    scenario: str,
+    folder: str | Path | None = None,
+    *,
+    algo: str = PPO,
+    data: Sequence[str | Path] = (),
+    report: ProgressCallback | None = None,
+    **settings: Any,
+) -> TrainingResult:
+    """Train a policy with PPO and the preset of a scenario, or by another algorithm.
+
+    Args:
+        scenario: Name or code, see `registry.find_scenario`.
+        folder: Folder of the run; None for ``runs/SCENARIO-SEED``.
+        algo: "ppo"; "sac_her", for scenarios with goals; "bc" or "iql", which learn
+            from recordings.
+        data: Files of recordings and folders of them, for those.
+        report: Function of steps done, steps in all and the latest evaluation.
+        **settings: Changes of the preset, see `learn.ppo_config.PPOConfig`,
+            `learn.hindsight.config.HindsightConfig` and
+            `learn.offline.config.OfflineConfig`: `total_steps`, `seed`, `profile`,
+            `observe`, `options`, `drivers` and so on.
+
+    Raises:
+        ValueError: An unknown scenario or setting, or a folder that holds a run.
+        RuntimeError: A missing extra, with the line that installs it.
+    """
+    config = make_config(algo, scenario, data, settings)
+    place = Path(folder) if folder else default_folder(config)
+    row = run_training(config, place, report)
+    return TrainingResult(place, int(row["steps"]), dict(row))
+
+
+def default_folder(config: AnyConfig) -> Path:
+    """Return the folder of a run that nobody has named."""
+    kind = "" if isinstance(config, PPOConfig) else f"{config.algo}-"
+    return Path("runs") / f"{find_scenario(config.scenario).name}-{kind}{config.seed}"
+
+
+def run_training(
     config: AnyConfig | None,
     folder: Path,
     report: ProgressCallback | None = None,
 ) -> Metrics:
-    """Train a policy, or resume a run that was cut off.
+    """Train a policy in a folder, or resume a run that was cut off.
 
     Args:
-        config: configuration of a new run; None to resume the run in the folder.
-        folder: folder of the run; must be new unless it is resumed.
-        report: called during training.
+        config: Configuration of a new run; None to resume the run in the folder.
+        folder: Folder of the run; must be new unless it is resumed.
+        report: Function of steps done, steps in all and the latest evaluation.
 
     Returns:
         The last row of ``evaluations.csv``.
@@ -52,9 +116,9 @@ def train(
         raise ValueError(
             f"{folder} holds a run already: --resume it, or say another --out"
         )
-    go_on = _continuation(config, folder, report)
+    resume = _continuation(config, folder, report)
     if (folder / "config.toml").exists():
-        return go_on()
+        return resume()
     before = set(folder.rglob("*"))
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.toml").write_text(config.to_toml())
@@ -62,7 +126,7 @@ def train(
         trust_code(named)
     (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
     try:
-        return go_on()
+        return resume()
     except BaseException:
         # A run that fails to start leaves nothing behind that it has made.
         if not (folder / "state.json").exists():

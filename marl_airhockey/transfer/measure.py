@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
+from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.settings import load_config
 from marl_airhockey.world.build import Keywords
@@ -27,23 +26,6 @@ TUNING: dict[str, Any] = {
 """Settings that replace a run's when its policy is trained further on robosuite."""
 
 
-@dataclass(frozen=True)
-class TransferResult:
-    """Success of one policy on one backend in one profile."""
-
-    policy: str
-    backend: str
-    profile: str
-    episodes: int
-    success: float
-    interval: tuple[float, float]
-    """95 % interval of the success, Wilson's"""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the fields as a JSON object."""
-        return asdict(self)
-
-
 def measure_transfer(
     policies: dict[str, Driver],
     scenario: str,
@@ -52,7 +34,7 @@ def measure_transfer(
     episodes: int = 200,
     keywords: Keywords | None = None,
     report: Callable[[], None] = lambda: None,
-) -> list[TransferResult]:
+) -> list[EvaluationResult]:
     """Evaluate policies in all backends and profiles, on the same episodes' seeds.
 
     Args:
@@ -73,9 +55,16 @@ def measure_transfer(
                     "backend": backend,
                     "profile": profile,
                 }
-                found = evaluate(driver, name, scenario, episodes, TEST_SEED, chosen)
-                shown = found.success, found.success_interval
-                rows.append(TransferResult(name, backend, profile, episodes, *shown))
+                rows.append(
+                    evaluate(
+                        driver,
+                        scenario,
+                        episodes=episodes,
+                        name=name,
+                        exact=True,
+                        **chosen,
+                    )
+                )
                 report()
     return rows
 
@@ -99,7 +88,7 @@ def pretraining_config(scenario: str, profile: str, seed: int) -> PPOConfig:
     return preset(scenario, {"profile": profile, "seed": seed})
 
 
-def plot_transfer(rows: Sequence[TransferResult], path: Path) -> None:
+def plot_transfer(rows: Sequence[EvaluationResult], path: Path) -> None:
     """Draw success by policy: a panel for each profile, a colour for each backend."""
     import matplotlib.pyplot as plt
 
@@ -107,7 +96,7 @@ def plot_transfer(rows: Sequence[TransferResult], path: Path) -> None:
 
     profiles = list(dict.fromkeys(row.profile for row in rows))
     backends = list(dict.fromkeys(row.backend for row in rows))
-    policies = list(dict.fromkeys(row.policy for row in rows))[::-1]
+    policies = list(dict.fromkeys(row.driver for row in rows))[::-1]
     figure, grid = plt.subplots(
         1,
         len(profiles),
@@ -121,9 +110,11 @@ def plot_transfer(rows: Sequence[TransferResult], path: Path) -> None:
         for k, (backend, ink) in enumerate(zip(backends, (INK, *INKS), strict=False)):
             offset = 0.16 * (k - (len(backends) - 1) / 2)
             mine = [r for r in rows if (r.profile, r.backend) == (profile, backend)]
-            heights = [policies.index(row.policy) - offset for row in mine]
+            heights = [policies.index(row.driver) - offset for row in mine]
             axes.hlines(
-                heights, *zip(*(r.interval for r in mine), strict=True), color=ink
+                heights,
+                *zip(*(r.success_interval for r in mine), strict=True),
+                color=ink,
             )
             axes.plot([r.success for r in mine], heights, "o", color=ink, label=backend)
         axes.set_yticks(range(len(policies)), policies)

@@ -30,7 +30,7 @@ def test_every_player_meets_every_other_in_both_roles():
     found = play_together("rally", players("allround", "still"), 8, 3, SHORT)
     assert found.returns[0, 0] > found.returns[1, 1] == 0.0
     one, mate = make_agent("still"), {"drivers": {"paddle_1": "allround"}}
-    alone = evaluate(one, "still", "rally", 8, 3, {**SHORT, **mate})
+    alone = evaluate(one, "rally", episodes=8, seed=3, **{**SHORT, **mate})
     assert found.returns[1, 0] == alone.returns
     assert found.to_json()["players"] == ["allround", "still"]
 

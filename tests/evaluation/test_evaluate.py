@@ -1,6 +1,5 @@
 """Measures of evaluation."""
 
-import marl_airhockey as ah
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
@@ -15,8 +14,8 @@ def test_the_measures_of_a_match():
     assert calm.grade == "A"
     assert Deployability.of(0.0, 1.0, 0.3, 1.0, 0.05).grade == "C"
     assert Deployability.of(0.9, 1.0, 0.0, 1.0, 0.05).grade == "D"
-    wild = evaluate(ah.make_agent("random"), "random", "reach", 50).deployability
-    still = evaluate(ah.make_agent("still"), "still", "reach", 50).deployability
+    wild = evaluate("random", "reach", episodes=50).deployability
+    still = evaluate("still", "reach", episodes=50).deployability
     assert still.violations_per_minute == 0
     assert still.grade == "A"
     assert wild.violations_per_minute > 600

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from marl_airhockey.evaluation.games import GameResults
-from marl_airhockey.evaluation.league import compared, lineups_of, play_league
+from marl_airhockey.evaluation.league import compared, league, lineups_of
 from marl_airhockey.evaluation.stats import elo, unbeaten_mixture
 from marl_airhockey.registry import make_agent
 
@@ -16,7 +16,7 @@ SHORT = {"options": {"seconds": 6.0}, "backend": "numba"}
 def test_a_league_rates_and_names_its_files(tmp_path):
     names = ("random", "allround", "striker:strength=weak", "still")
     players = {name: make_agent(name) for name in names}
-    standings = play_league("duel", players, 20, keywords=SHORT)
+    standings = league("duel", players, games=20, **SHORT)
     off = ~np.eye(4, dtype=bool)
     np.testing.assert_allclose((standings.score + standings.score.T)[off], 1.0)
     np.testing.assert_allclose(standings.margin, -standings.margin.T)
@@ -30,11 +30,11 @@ def test_a_league_rates_and_names_its_files(tmp_path):
     assert report["players"][0] == report["table"][0]["player"] == "allround"
     assert "| allround |" in files[1].read_text()
     with pytest.raises(ValueError, match="two players"):
-        play_league("duel", {"still": players["still"]}, 2)
+        league("duel", {"still": players["still"]}, games=2)
 
 
 def test_a_circle_is_named():
-    standings = play_league("duel", {n: make_agent(n) for n in ("still", "random")}, 2)
+    standings = league("duel", ("still", "random"), games=2)
     wins = np.array([[0, 90, 5], [5, 0, 90], [90, 5, 0]])
     three = type(standings)(
         "duel", ("a", "b", "c"), 100, wins, np.full((3, 3), 5), *np.zeros((3, 3, 3))
@@ -81,7 +81,7 @@ def test_a_league_of_four_sides_rates_by_places(tmp_path):
     names = ("still", "random", "goalkeeper", "allround", "striker")
     players = {name: make_agent(name) for name in names}
     short = {"options": {"seconds": 15.0, "lives": 1}}
-    standings = play_league("free_for_all", players, 24, keywords=short)
+    standings = league("free_for_all", players, games=24, **short)
     assert standings.played.sum() > 0
     ranked = [names[i] for i in standings.order]
     assert set(ranked[:3]) == {"goalkeeper", "allround", "striker"}

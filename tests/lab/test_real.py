@@ -26,7 +26,7 @@ def keywords(rig, **options):
 
 def test_a_policy_reaches_through_camera_and_robot(rig):
     driver = make_agent("zoo/reach_full_size")
-    result = evaluate(driver, "reach", "reach", 2, keywords=keywords(rig))
+    result = evaluate(driver, "reach", episodes=2, **keywords(rig))
     assert result.success == 1.0
     assert result.interrupted == 0
 

@@ -13,7 +13,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.hindsight.config import hindsight_config
 from marl_airhockey.learn.hindsight.sac import Evaluations, build_model
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.learn.train import load_any_config, train
+from marl_airhockey.learn.train import load_any_config, run_training
 from marl_airhockey.policies.load import load_policy
 
 SMALL = {
@@ -53,12 +53,12 @@ def test_a_run_that_was_cut_goes_on(tmp_path):
             raise Cut
 
     with pytest.raises(Cut):
-        train(config, tmp_path / "run", stop)
+        run_training(config, tmp_path / "run", stop)
     assert load_any_config(tmp_path / "run") == config
-    row = train(None, tmp_path / "run")
+    row = run_training(None, tmp_path / "run")
     assert row["steps"] >= config.total_steps
     policy = load_policy(tmp_path / "run")
-    found = evaluate(policy, "run", "reach", 20, keywords=config.keywords)
+    found = evaluate(policy, "reach", episodes=20, **config.keywords)
     assert 0.0 <= found.success <= 1.0
 
 
@@ -70,7 +70,7 @@ def test_a_scenario_without_goals_is_named():
 def test_a_run_shorter_than_an_episode_is_named(tmp_path):
     config = hindsight_config("reach", {**SMALL, "total_steps": 100})
     with pytest.raises(ValueError, match="total_steps: 100 must be above"):
-        train(config, tmp_path / "run")
+        run_training(config, tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 

@@ -15,7 +15,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.offline.iql import ImplicitQLearning
-from marl_airhockey.learn.train import load_any_config, train
+from marl_airhockey.learn.train import load_any_config, run_training
 from marl_airhockey.registry import make_agent
 
 SMALL = {"hidden": [64, 64], "total_steps": 1500, "evaluations": 3}
@@ -91,12 +91,12 @@ def test_a_share_is_that_of_the_best_episodes(mixed):
 def test_what_an_expert_did_is_learned(algo, expert, tmp_path):
     config = offline_config(algo, [expert], SMALL)
     assert config.scenario == "reach"
-    row = train(config, tmp_path / "run")
+    row = run_training(config, tmp_path / "run")
     assert row["success"] >= 0.9
     assert row["steps"] == SMALL["total_steps"]
     assert load_any_config(tmp_path / "run") == config
     driver = ah.make_agent(tmp_path / "run")
-    assert evaluate(driver, "run", "reach", 50).success >= 0.9
+    assert evaluate(driver, "reach", episodes=50).success >= 0.9
 
 
 def test_a_run_that_was_cut_off_goes_on(expert, tmp_path):
@@ -109,12 +109,12 @@ def test_a_run_that_was_cut_off_goes_on(expert, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path, stop)
+        run_training(config, tmp_path, stop)
     begun = len((tmp_path / "evaluations.csv").read_text().splitlines())
-    row = train(None, tmp_path)
+    row = run_training(None, tmp_path)
     assert row["steps"] == SMALL["total_steps"]
     assert len((tmp_path / "evaluations.csv").read_text().splitlines()) > begun
-    assert train(None, tmp_path) == row, "there is nothing left to do"
+    assert run_training(None, tmp_path) == row, "there is nothing left to do"
 
 
 @pytest.mark.filterwarnings("ignore:No target network updater")
@@ -219,7 +219,7 @@ def test_gradients_of_a_loss_reach_its_own_network_alone(expert):
 )
 def test_bad_settings_are_named(expert, tmp_path, change, words):
     with pytest.raises(ValueError, match=words):
-        train(offline_config("bc", [expert], SMALL | change), tmp_path / "run")
+        run_training(offline_config("bc", [expert], SMALL | change), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
@@ -236,4 +236,4 @@ def test_data_that_does_not_fit_is_named(expert, tmp_path):
     apart = tmp_path / "goals"
     record(apart, "still", "hit_goal", 2, options={"goals": "dict"})
     with pytest.raises(ValueError, match="no flat observations"):
-        train(offline_config("bc", [apart], SMALL), tmp_path / "run")
+        run_training(offline_config("bc", [apart], SMALL), tmp_path / "run")

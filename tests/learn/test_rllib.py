@@ -13,12 +13,10 @@ import time
 import pytest
 from tutorials import run
 
-import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.ppo_config import preset
-from marl_airhockey.learn.train import train
-from marl_airhockey.registry import make_agent
+from marl_airhockey.learn.train import run_training
 
 ray = pytest.importorskip("ray", reason="Ray has an environment of its own")
 
@@ -40,11 +38,11 @@ def rows(folder):
 def test_it_learns_and_its_policy_drives_without_ray(tmp_path):
     folder = tmp_path / "touch-0"
     changes = {**TOUCH, "total_steps": 98_304, "evaluations": 2, "num_env_runners": 2}
-    row = train(preset("touch", changes), folder)
+    row = run_training(preset("touch", changes), folder)
     assert row["steps"] == 98_304
     assert [int(r["steps"]) for r in rows(folder)] == [49_152, 98_304]
-    still = evaluate(ah.make_agent("still"), "still", "touch", 200)
-    learned = evaluate(make_agent(str(folder)), "learned", "touch", 200)
+    still = evaluate("still", "touch", episodes=200)
+    learned = evaluate(str(folder), "touch", episodes=200)
     assert learned.success > still.success + 0.3
     code = (
         "import sys, numpy as np, marl_airhockey as ah\n"
@@ -98,7 +96,7 @@ def test_a_killed_run_goes_on_where_it_stood(tmp_path):
     process.wait()
     stood = [int(row["steps"]) for row in rows(folder)]
     assert stood[-1] < 400_000
-    row = train(None, folder)
+    row = run_training(None, folder)
     assert row["steps"] >= 400_000
     assert [int(r["steps"]) for r in rows(folder)][: len(stood)] == stood
     assert len(list(folder.glob("rllib-*"))) == 1

@@ -16,7 +16,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.best_response import best_response
 from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.transfer.measure import fine_tuning_config
@@ -35,8 +35,8 @@ def test_a_run_of_another_format_is_refused(tmp_path, found):
     (folder / "config.toml").write_text(number + settings)
     fresh = preset("duel", {**SMALL, "init": str(folder)})
     for use in (
-        lambda: train(None, folder),
-        lambda: train(fresh, tmp_path / "fresh"),
+        lambda: run_training(None, folder),
+        lambda: run_training(fresh, tmp_path / "fresh"),
         lambda: export_policy(folder, tmp_path / "policy.npz"),
         lambda: fine_tuning_config(folder, 64),
         lambda: best_response("duel", "still", 64, folder),
@@ -72,16 +72,16 @@ def test_a_run_leaves_all_that_is_needed(touch_run):
 
 
 def test_it_learned_to_touch(touch_run):
-    learned = evaluate(load_policy(touch_run), "learned", "touch", 200)
-    still = evaluate(ah.make_agent("still"), "still", "touch", 200)
+    learned = evaluate(load_policy(touch_run), "touch", episodes=200)
+    still = evaluate("still", "touch", episodes=200)
     assert learned.success > still.success + 0.3
 
 
 def test_a_finished_run_is_not_overwritten(touch_run):
     with pytest.raises(ValueError, match="holds a run already"):
-        train(preset("touch", SMALL), touch_run)
+        run_training(preset("touch", SMALL), touch_run)
     steps = rows(touch_run)[-1]["steps"]
-    assert int(train(None, touch_run)["steps"]) == int(steps)
+    assert int(run_training(None, touch_run)["steps"]) == int(steps)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
 def test_presets_learn_their_tasks(task, tmp_path):
     config = preset(task)
     assert isinstance(config, PPOConfig)
-    row = train(config, tmp_path / task)
+    row = run_training(config, tmp_path / task)
     assert row["success"] >= 0.9
 
 
@@ -144,7 +144,7 @@ def test_weights_of_a_torch_run_hold_no_code(touch_run, tmp_path):
     state = torch.load(touch_run / "last.pt", weights_only=True)
     assert set(state) == {"model", "optimizer"}
     fresh = preset("touch", {**SMALL, "init": str(touch_run)})
-    row = train(fresh, tmp_path / "again")
+    row = run_training(fresh, tmp_path / "again")
     assert row["success"] > 0.5
 
 
@@ -160,7 +160,7 @@ def test_pixels_and_goals_are_learned_by_sb3(changes):
 
 def test_all_cpu_time_is_counted_by_kind(tmp_path):
     began = time.process_time()
-    train(preset("touch", SMALL), tmp_path / "run")
+    run_training(preset("touch", SMALL), tmp_path / "run")
     spent = time.process_time() - began
     state = json.loads((tmp_path / "run/state.json").read_text())
     kinds = [f"{k}_cpu_seconds" for k in ("learning", "evaluation", "setup")]
@@ -173,7 +173,7 @@ def test_all_cpu_time_is_counted_by_kind(tmp_path):
 
 def test_an_older_run_resumes_with_the_columns_that_it_has(tmp_path):
     folder = tmp_path / "run"
-    train(preset("touch", SMALL), folder)
+    run_training(preset("touch", SMALL), folder)
     kept = ("steps", "cpu_seconds", "success", "return")
     old = [",".join(row[name] for name in kept) for row in rows(folder)]
     (folder / "evaluations.csv").write_text("\n".join([",".join(kept), *old]) + "\n")
@@ -182,7 +182,7 @@ def test_an_older_run_resumes_with_the_columns_that_it_has(tmp_path):
     (folder / "state.json").write_text(json.dumps({n: state[n] for n in names}))
     config = (folder / "config.toml").read_text()
     (folder / "config.toml").write_text(config.replace("16384", "32768"))
-    train(None, folder)
+    run_training(None, folder)
     found = rows(folder)
     assert len(found) > len(old)
     assert list(found[-1]) == list(kept)

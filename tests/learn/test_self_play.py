@@ -7,7 +7,7 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.league import find_policies
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play import make_training_env
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 
 GAME = {**SMALL, "num_worlds": 32, "batch_size": 256, "n_steps": 16, "snapshots": 4}
@@ -94,7 +94,7 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     folder = tmp_path / "run"
     config = preset("duel", GAME)
     assert config.self_play
-    last = train(config, folder)
+    last = run_training(config, folder)
     assert set(last) >= {"score", "score/random", "return"}
     assert len(rows(folder)) >= 2
     assert len(list((folder / "pool").glob("*.npz"))) == 2
@@ -107,5 +107,5 @@ def test_self_play_trains_resumes_and_keeps_its_past(tmp_path):
     np.testing.assert_allclose(*(np.clip(x, -1, 1) for x in same), atol=1e-5)
     text = (folder / "config.toml").read_text().replace("= 6144", "= 9216")
     (folder / "config.toml").write_text(text)
-    assert train(None, folder)["steps"] > last["steps"]
+    assert run_training(None, folder)["steps"] > last["steps"]
     assert find_policies(tmp_path) == [folder]

@@ -17,16 +17,16 @@ from marl_airhockey.registry import make_agent
 
 
 def test_a_policy_plays_the_same_deterministically_and_samples_otherwise(touch_run):
-    mean = evaluate(load_policy(touch_run), "mean", "touch", 40)
-    again = evaluate(load_policy(touch_run), "mean", "touch", 40)
+    mean = evaluate(load_policy(touch_run), "touch", episodes=40)
+    again = evaluate(load_policy(touch_run), "touch", episodes=40)
     assert mean.returns == again.returns
     sampled = load_policy(touch_run, deterministic=False)
-    assert evaluate(sampled, "sampled", "touch", 40).returns != mean.returns
+    assert evaluate(sampled, "touch", episodes=40).returns != mean.returns
 
 
 def test_a_policy_of_another_scenario_is_refused(touch_run):
     with pytest.raises(ValueError, match="expects observations of shape"):
-        evaluate(load_policy(touch_run), "learned", "juggle", 2)
+        evaluate(load_policy(touch_run), "juggle", episodes=2)
 
 
 def test_any_sb3_zip_whose_spaces_fit_drives(tmp_path):
@@ -34,7 +34,7 @@ def test_any_sb3_zip_whose_spaces_fit_drives(tmp_path):
     for kind, extra in ((PPO, {"n_steps": 8, "batch_size": 16}), (SAC, {})):
         path = tmp_path / f"{kind.__name__}.zip"
         kind("MlpPolicy", env, policy_kwargs={"net_arch": [8]}, **extra).save(path)
-        result = evaluate(load_policy(path, trust=True), kind.__name__, "reach", 5)
+        result = evaluate(load_policy(path, trust=True), "reach", episodes=5)
         assert result.episodes == 5
 
 
@@ -65,12 +65,12 @@ def onnx_policy(path, size, outputs):
 def test_an_onnx_policy_whose_spaces_fit_drives(tmp_path):
     onnx_policy(tmp_path / "good.onnx", 8, 2)
     driver = load_policy(tmp_path / "good.onnx")
-    assert evaluate(driver, "onnx", "reach", 5).episodes == 5
+    assert evaluate(driver, "reach", episodes=5).episodes == 5
     with pytest.raises(ValueError, match="expects observations"):
-        evaluate(driver, "onnx", "touch", 2)
+        evaluate(driver, "touch", episodes=2)
     onnx_policy(tmp_path / "wrong.onnx", 8, 3)
     with pytest.raises(ValueError, match="expected actions"):
-        evaluate(load_policy(tmp_path / "wrong.onnx"), "onnx", "reach", 2)
+        evaluate(load_policy(tmp_path / "wrong.onnx"), "reach", episodes=2)
 
 
 def test_a_policy_can_sit_in_any_seat_by_its_path(touch_run):

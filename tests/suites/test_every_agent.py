@@ -75,7 +75,7 @@ def test_it_plays_both_ends_alike(agent):
     ],
 )
 def test_a_script_is_an_honest_baseline(task, script, bar):
-    result = evaluate(ah.make_agent(script), script, task, 200)
+    result = evaluate(script, task, episodes=200)
     assert result.success >= bar
     low, high = result.success_interval
     assert low <= result.success <= high

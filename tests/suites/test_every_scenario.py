@@ -242,7 +242,7 @@ def test_rewards_are_the_sum_of_their_terms(scenario, backend):
 @pytest.mark.parametrize("driver", list(CHANCE))
 def test_chance_level_is_low(single, driver):
     # A matter of the rules, not of the backend: backends agree, as other tests show.
-    result = evaluate(ah.make_agent(driver), driver, single, 400, 0, {})
+    result = evaluate(driver, single, episodes=400, seed=0)
     if single == "touch":
         # A falling puck meets a still paddle one time in four.
         assert 0.15 < result.success < 0.40

@@ -42,7 +42,15 @@ def test_it_is_as_good_as_its_card(name):
     options["options"] = card["options"]
     if "success" in grades:
         driver = ah.make_agent(name)
-        found = evaluate(driver, name, card["scenario"], 200, 7, options)
+        found = evaluate(
+            driver,
+            card["scenario"],
+            episodes=200,
+            seed=7,
+            name=name,
+            exact=True,
+            **options,
+        )
         _, high = found.success_interval
         assert high >= grades["low"]
         return

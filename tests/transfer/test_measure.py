@@ -6,7 +6,7 @@ import pytest
 
 from marl_airhockey.cli.main import app
 from marl_airhockey.learn.ppo_config import preset
-from marl_airhockey.learn.train import train
+from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.trust import Trust
 from marl_airhockey.registry import make_agent
 from marl_airhockey.transfer.measure import (
@@ -40,11 +40,11 @@ def test_success_is_measured_in_all_physics(tmp_path):
 
 def test_training_begins_with_the_weights_of_a_run(tmp_path):
     first = preset("reach", {**SMALL, "total_steps": 65_536})
-    learned = train(first, tmp_path / "first")["success"]
+    learned = run_training(first, tmp_path / "first")["success"]
     config = preset("reach", {**SMALL, "init": str(tmp_path / "first"), "seed": 1})
-    again = train(config, tmp_path / "second")["success"]
+    again = run_training(config, tmp_path / "second")["success"]
     assert again >= learned - 0.3
-    assert again > train(preset("reach", SMALL), tmp_path / "fresh")["success"]
+    assert again > run_training(preset("reach", SMALL), tmp_path / "fresh")["success"]
     elsewhere = fine_tuning_config(tmp_path / "first", 4096)
     assert (elsewhere.backend, elsewhere.init) == ("robosuite", str(tmp_path / "first"))
     assert elsewhere.observe == first.observe
@@ -52,12 +52,12 @@ def test_training_begins_with_the_weights_of_a_run(tmp_path):
         "reach", {**SMALL, "init": str(tmp_path / "first"), "hidden": [8, 8]}
     )
     with pytest.raises(ValueError, match="another size"):
-        train(wrong, tmp_path / "wrong")
+        run_training(wrong, tmp_path / "wrong")
     with pytest.raises(ValueError, match="rllib cannot begin"):
         preset("reach", {**SMALL, "init": "x", "engine": "rllib"})
     lost = preset("reach", {**SMALL, "init": str(tmp_path / "nowhere")})
     with pytest.raises(ValueError, match="no folder of a run"):
-        train(lost, tmp_path / "lost")
+        run_training(lost, tmp_path / "lost")
 
 
 def test_transfer_goes_on_with_what_was_cut_off(tmp_path, monkeypatch):

@@ -95,7 +95,7 @@ def test_a_profile_of_a_table_is_written_and_played(tmp_path):
     write_rows(path, 0.0003)
     spread = {"mean": 0.03, "sd": 0.001, "least": 0.028, "most": 0.032}
     delays.write_text(json.dumps({"camera": spread, "arm": {**spread, "mean": 0.067}}))
-    words = ["fit", str(path), "--table", "ubc_pro", "--base", "ur5e"]
+    words = ["fit-table", str(path), "--table", "ubc_pro", "--base", "ur5e"]
     words += ["--delays", str(delays), "--out", str(out)]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
@@ -149,7 +149,7 @@ def test_what_is_wrong_with_a_profile_is_said(tmp_path, text, error):
 def test_the_command_writes_physics_that_can_be_played(tmp_path):
     path, out = tmp_path / "rows.csv", tmp_path / "mine.toml"
     write_rows(path, 0.0003, corner=True)
-    words = ["fit", str(path), "--table", "ubc_pro", "--origin", "corner"]
+    words = ["fit-table", str(path), "--table", "ubc_pro", "--origin", "corner"]
     result = CliRunner().invoke(app, [*words, "--out", str(out)])
     assert result.exit_code == 0, result.output
     assert "not identifiable" in " ".join(result.output.split())

@@ -1,0 +1,136 @@
+"""Commands ``airhockey fit | fit-table``: the 2D table's physics, fitted to play."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from marl_airhockey.cli.options import Physics, console, physics_of
+from marl_airhockey.cli.progress import waiting
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.parameters import PARAMETERS
+from marl_airhockey.core.profiles import PROFILES
+from marl_airhockey.core.table import TABLES
+from marl_airhockey.registry import make_agent
+from marl_airhockey.transfer.table_fit import FittedTable
+from marl_airhockey.world.build import Keywords
+
+FitFile = Annotated[Path, typer.Option(help="File to write.")]
+
+
+def fit(
+    scenario: Annotated[
+        str, typer.Argument(help="Scenario that is played, without blocks.")
+    ] = "juggle",
+    driver: Annotated[
+        str | None, typer.Option(help="Driver; by default the zoo's policy.")
+    ] = None,
+    backend: Annotated[str, typer.Option(help="Backend of the play.")] = "robosuite",
+    physics: Physics = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="Folder of recordings of play, instead of playing."),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="Control steps of play.", min=1)] = 3000,
+    seed: Annotated[int, typer.Option(help="Seed of the play.")] = 0,
+    out: FitFile = Path("fit.toml"),
+) -> None:
+    """Fit the 2D table's physics to play on another one, for --physics FILE."""
+    if scenario.endswith(".csv"):
+        raise ValueError(f"fit: rows of a table are for airhockey fit-table {scenario}")
+    from marl_airhockey.core.recording import SUFFIX
+    from marl_airhockey.transfer.recorded_play import load_recordings, record_play
+    from marl_airhockey.transfer.system_id import fit_physics
+
+    if recordings is not None:
+        seen = load_recordings(sorted(recordings.glob(f"*{SUFFIX}")))
+    else:
+        player = make_agent(driver or f"zoo/{scenario}")
+        there = physics_of(physics)
+        with waiting(f"playing {steps} steps on {backend}"):
+            keywords: Keywords = {"backend": backend, "physics": there}
+            seen = record_play(scenario, player, steps, seed, keywords)
+    with waiting("fitting"):
+        found = fit_physics(seen)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(found.to_toml())
+    shown = Table("", "usual values", "fitted", title=f"{found.segments} segments")
+    for name, value in found.physics.items():
+        usual = seen.scene.defaults.get(name, PARAMETERS[name].default)
+        shown.add_row(f"{name}, {PARAMETERS[name].unit}", f"{usual:g}", f"{value:.4g}")
+    for k, name in enumerate(("pucks off, mm", "paddles off, mm")):
+        errors = (f"{1000 * x[k]:.2f}" for x in (found.before, found.after))
+        shown.add_row(name, *errors)
+    console.print(shown)
+    console.print(
+        f"{found.error_reduction:.0%} of the pucks' error is gone; wrote {out}"
+    )
+
+
+def fit_table(
+    rows: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.csv...",
+            help="Rows t,x,y (s, m) of a real table, optionally with "
+            "paddle_x,paddle_y.",
+        ),
+    ],
+    table: Annotated[
+        str, typer.Option(help="Table of the rows, by name.")
+    ] = "standard",
+    origin: Annotated[
+        str, typer.Option(help="Origin of the rows: centre, or corner (least x and y).")
+    ] = "centre",
+    base: Annotated[
+        str | None,
+        typer.Option(help="Write a profile for --profile, with the rest of this one."),
+    ] = None,
+    delays: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Output of calibrate delay --json or calibrate arm --json, for the "
+            "profile of --base; repeatable."
+        ),
+    ] = None,
+    out: FitFile = Path("fit.toml"),
+) -> None:
+    """Fit the physics of a real table to rows of play on it."""
+    from marl_airhockey.transfer.corrected_fit import fit_corrected
+    from marl_airhockey.transfer.profile_file import profile_toml, read_delays
+    from marl_airhockey.transfer.track import read_track
+
+    if table not in TABLES:
+        raise ValueError(unknown_name("table", table, TABLES))
+    if base is not None and base not in PROFILES:
+        raise ValueError(f"--base: {unknown_name('profile', base, PROFILES)}")
+    if delays and base is None:
+        raise ValueError("--delays: add --base, the profile that has the rest")
+    measured = read_delays(delays) if delays else None
+    with waiting("fitting"):
+        tracks = [read_track(path, TABLES[table], origin) for path in rows]
+        found = fit_corrected(tracks, TABLES[table])
+    count = sum(len(track.time) for track in tracks)
+    what = f"{table}, fitted to {count} rows of play"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(
+        found.to_toml() if base is None else profile_toml(found, base, measured, what)
+    )
+    console.print(_fitted(found, table))
+    console.print("wrote", out)
+
+
+def _fitted(found: FittedTable, table: str) -> Table:
+    """Return a table of fitted parameters with their intervals."""
+    shown = Table("", "fitted", "95 % interval", "flights or bounces", title=table)
+    lines = [(f"{n}, {PARAMETERS[n].unit}", e) for n, e in found.found.items()]
+    lines += [(f"wall_restitution, side {k}", e) for k, e in found.by_side.items()]
+    for label, e in lines:
+        interval = f"{e.low:.4g} .. {e.high:.4g}"
+        shown.add_row(label, f"{e.value:.4g}", interval, str(e.count))
+    for name, why in found.missing.items():
+        shown.add_row(name, "-", why, "")
+    return shown
