@@ -38,19 +38,19 @@ def make_world(
 def parallel_env(
     scenario: str | Scenario,
     render_mode: str | None = None,
-    camera: str = "top",
+    viewpoint: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeyEnv:
     """Build a PettingZoo ParallelEnv of a scenario; its open seats are the agents."""
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 
-    return AirHockeyEnv(scenario, render_mode, camera, **keywords)
+    return AirHockeyEnv(scenario, render_mode, viewpoint, **keywords)
 
 
 def env(
     scenario: str | Scenario,
     render_mode: str | None = None,
-    camera: str = "top",
+    viewpoint: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AECEnv[str, Any, Any]:
     """Build the same as a PettingZoo AEC environment, with its usual wrappers."""
@@ -58,14 +58,14 @@ def env(
     from pettingzoo.utils.wrappers import OrderEnforcingWrapper
 
     return OrderEnforcingWrapper(
-        parallel_to_aec(parallel_env(scenario, render_mode, camera, **keywords))
+        parallel_to_aec(parallel_env(scenario, render_mode, viewpoint, **keywords))
     )
 
 
 def gym_env(
     scenario: str | Scenario,
     render_mode: str | None = None,
-    camera: str = "top",
+    viewpoint: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeySingleEnv:
     """Build a gymnasium Env of a scenario with one open seat, a task of one's own too.
@@ -74,7 +74,7 @@ def gym_env(
     """
     from marl_airhockey.envs.gymnasium_env import make_single
 
-    return make_single(scenario, render_mode, camera, **keywords)
+    return make_single(scenario, render_mode, viewpoint, **keywords)
 
 
 def make_vec(

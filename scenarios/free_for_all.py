@@ -181,7 +181,7 @@ class FreeForAll(Scenario):
         starts.serve(rng, state, 0, self._toward(memory["serve"]))
         return state, memory
 
-    def retired(self, memory: Memory) -> Array | None:
+    def eliminated(self, memory: Memory) -> Array | None:
         return np.asarray(memory["lives"] <= 0.0)
 
     def caption(self, memory: Memory) -> str:
@@ -193,7 +193,9 @@ class FreeForAll(Scenario):
         merit = np.where(lives == lives.max(-1, keepdims=True), shots, -1.0)
         best = merit == merit.max(-1, keepdims=True)
         alone = best.sum(-1, keepdims=True) == 1
-        return np.asarray(best & alone & (self.terminated(t) | t.last)[..., None])
+        return np.asarray(
+            best & alone & (self.terminated(t) | t.time_limit_reached)[..., None]
+        )
 
 
 make = FreeForAll

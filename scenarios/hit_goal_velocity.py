@@ -67,7 +67,7 @@ class HitGoalVelocity(GoalScenario):
             "entered": np.zeros(worlds, np.bool_),
         }
 
-    def aim(
+    def finalize_goals(
         self,
         rng: RandomStreams,
         state: State,

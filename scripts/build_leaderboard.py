@@ -9,8 +9,8 @@ from pathlib import Path
 
 import typer
 
-from marl_airhockey.evaluation.card import PROTOCOL, Card
 from marl_airhockey.evaluation.challenge import PROFILES
+from marl_airhockey.evaluation.challenge_report import PROTOCOL, ChallengeReport
 
 DOCS = Path(__file__).parent.parent / "docs"
 PARTS = (*PROFILES, "tasks", "duel")
@@ -34,7 +34,7 @@ ten tasks in the profile; tasks: in all; duel: share of won games.
 def main() -> None:
     """Read the cards, write the page."""
     cards = {
-        path: Card.from_json(path.read_text())
+        path: ChallengeReport.from_json(path.read_text())
         for path in sorted((DOCS / "leaderboard").glob("*.json"))
     }
     lines = [HEAD, f"| player | {' | '.join(PARTS)} |", "| --- " * 6 + "|"]

@@ -174,8 +174,8 @@ FAULTS = [
     Fault(
         "own paddle forgotten",
         "marl_airhockey/toolkit/observables.py",
-        "out[...] = (ego.puck_now[0] - ego.own[..., None, :]).reshape(out.shape)",
-        "out[...] = ego.puck_now[0].reshape(out.shape)",
+        "out[...] = (ego.puck_predicted[0] - ego.own[..., None, :]).reshape(out.shape)",
+        "out[...] = ego.puck_predicted[0].reshape(out.shape)",
         "world suites/test_every_agent.py",
     ),
 ]

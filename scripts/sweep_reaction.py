@@ -4,7 +4,7 @@
     python scripts/sweep_reaction.py --home zoo/duel --far allround --reactions 0.15
 
 A reaction is the time by which seats see pucks and the other paddle late. Without one a
-keeper that reckons ahead stops everything; with one attack pays. The score is by goals
+keeper that predicts stops everything; with one attack pays. The score is by goals
 alone: a level game, which shots on goal decide, is half a win here.
 """
 

@@ -11,13 +11,13 @@ from marl_airhockey import __version__
 from marl_airhockey.cli.options import AsJson, Trusting, console
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import require
-from marl_airhockey.evaluation.card import Result
 from marl_airhockey.evaluation.challenge import (
     FIELD,
     PROFILES,
     TASKS,
     play_challenge,
 )
+from marl_airhockey.evaluation.challenge_report import Result
 
 
 def challenge(

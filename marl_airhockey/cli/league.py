@@ -64,7 +64,7 @@ def play_league(
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Let everybody play everybody: ratings, matrix, circles of wins."""
+    """Let everybody play everybody: ratings, matrix, cycles of wins."""
     require("matplotlib", "train")
     given = players or ([] if folder else SCRIPTS)
     entries = [*given, *(find_policies(folder) if folder else [])]
@@ -94,8 +94,8 @@ def play_league(
         console.print_json(json.dumps(report))
         return
     console.print(table(standings))
-    for circle in standings.circles:
-        console.print("circle:", " > ".join((*circle, circle[0])))
+    for cycle in standings.cycles:
+        console.print("cycle:", " > ".join((*cycle, cycle[0])))
     for name, scores in responses.items():
         shown = ", ".join(f"{score:.3f}" for score in scores)
         console.print(f"best response to {name} after {exploit:,} steps: {shown}")

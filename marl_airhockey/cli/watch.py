@@ -49,8 +49,8 @@ def watch(
     physics: Physics = None,
     observe: Observe = None,
     control_dt: ControlDt = None,
-    camera: Annotated[
-        str, typer.Option(help="top, or a camera of the backend: agentview...")
+    viewpoint: Annotated[
+        str, typer.Option(help="top, or a viewpoint of the backend: agentview...")
     ] = "top",
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 0,
@@ -81,7 +81,9 @@ def watch(
         {name: make_agent(name)}, scenario, keywords
     )
     with real_table(keywords, lab, rig) as table:
-        show_episodes(game, players[name], table, seed, episodes, video, camera=camera)
+        show_episodes(
+            game, players[name], table, seed, episodes, video, viewpoint=viewpoint
+        )
     if video is not None:
         console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")
 

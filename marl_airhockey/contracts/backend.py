@@ -82,7 +82,7 @@ class Backend(ABC):
     velocities come late."""
     timestep: ClassVar[float | None]
     """Longest physics step unless ``substeps`` is given, s; None without such steps."""
-    cameras: ClassVar[tuple[str, ...]] = ()
+    viewpoints: ClassVar[tuple[str, ...]] = ()
     """Names of views that it can take pictures from."""
 
     def __init__(
@@ -218,9 +218,9 @@ class Backend(ABC):
         return {}
 
     def photograph(
-        self, world: int, camera: str, marks: Sequence[Mark], width: int
+        self, world: int, viewpoint: str, marks: Sequence[Mark], width: int
     ) -> Array:
-        """Return (H, W, 3) uint8 of what one of the `cameras` sees of a world.
+        """Return (H, W, 3) uint8 of what one of the `viewpoints` shows of a world.
 
         Raises:
             RuntimeError: it cannot be drawn here; says what to install.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.reckoning import Walls, reckon
+from marl_airhockey.core.extrapolation import Walls, extrapolate
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.types import Array, Memory
@@ -56,7 +56,7 @@ class ObservationContext:
     """Time by which seats see pucks and other paddles late, s"""
 
     @property
-    def reckons(self) -> bool:
+    def extrapolates(self) -> bool:
         """True if pucks are shown as they were and as they would be now."""
         return self.reaction > 0.0 and self.observe != "history"
 
@@ -153,19 +153,19 @@ class EgoView:
         return rotated
 
     @property
-    def puck_now(self) -> tuple[Array, Array]:
+    def puck_predicted(self) -> tuple[Array, Array]:
         """(..., S, pucks, 2) pucks, brought forward by the reaction if any, m and m/s.
 
-        See `reckoning.reckon`; what paddles did in that time is not known.
+        See `extrapolation.extrapolate`; what paddles did in that time is not known.
         """
-        if not self.scope.reckons:
+        if not self.scope.extrapolates:
             return self.puck, self.puck_velocity
         seen = self.state.puck, self.state.puck_velocity
-        now = reckon(*seen, self.scope.reaction, self.scope.walls)
+        now = extrapolate(*seen, self.scope.reaction, self.scope.walls)
         return self.rotate(now[0]), self.rotate(now[1])
 
     @property
-    def own_then(self) -> tuple[Array, Array]:
+    def own_delayed(self) -> tuple[Array, Array]:
         """(..., S, 2) each seat's own paddle at the moment that it sees, m and m/s."""
         state = self.state
         return self._own(state.paddle), self._own(state.paddle_velocity)

@@ -38,7 +38,7 @@ class Transition(NamedTuple):
     """Memory of before the step"""
     new_memory: Memory
     """Memory of after the step"""
-    last: Array
+    time_limit_reached: Array
     """(...) bool: the clock ends the episode with this step"""
 
 
@@ -105,7 +105,7 @@ class Scenario(ABC):
         """
         return no_touches(state) if state.bodies.pucks else {}
 
-    def aim(
+    def finalize_goals(
         self,
         rng: RandomStreams,
         state: State,
@@ -153,7 +153,7 @@ class Scenario(ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} serves no puck")
 
-    def retired(self, memory: Memory) -> Array | None:
+    def eliminated(self, memory: Memory) -> Array | None:
         """(..., seats) bool: the seat is out of the game; None where none ever is.
 
         Their paddles stand behind their sides, whose goal lines are wall.

@@ -14,7 +14,7 @@ import numpy as np
 
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.parameters import PARAMETERS, PRESETS, SCATTER
-from marl_airhockey.core.profiles import Follow, find_profile
+from marl_airhockey.core.profiles import CorrelatedParameter, find_profile
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array
 
@@ -67,7 +67,7 @@ class Physics:
         values = dict(chosen)
         preset = _preset(values.pop("preset", None))
         self.ranges: dict[str, tuple[float, float]] = {}
-        self._follows: dict[str, Follow] = {}
+        self._follows: dict[str, CorrelatedParameter] = {}
         for name, parameter in PARAMETERS.items():
             if parameter.arms and not arms:
                 continue

@@ -24,7 +24,7 @@ SUFFIX = ".toml"
 
 
 @dataclass(frozen=True)
-class Follow:
+class CorrelatedParameter:
     """Parameter whose value follows another's along a line, within a spread."""
 
     other: str
@@ -57,7 +57,7 @@ class Profile:
     """Values in the units of the parameters"""
     shares: Mapping[str, Range] = field(default_factory=dict)
     """Multiples of what scenario and table say"""
-    follows: Mapping[str, Follow] = field(default_factory=dict)
+    follows: Mapping[str, CorrelatedParameter] = field(default_factory=dict)
     """Parameters that are not drawn alone"""
 
 
@@ -70,7 +70,7 @@ UNMEASURED = dict.fromkeys(
 )
 """Multiples of what could not be measured on the tables: within 15 %."""
 
-RAILS = Follow("wall_restitution", (0.65, 0.88), (0.08, 0.01), 0.01)
+RAILS = CorrelatedParameter("wall_restitution", (0.65, 0.88), (0.08, 0.01), 0.01)
 SLOPES = {"wall_restitution_slope": RAILS}
 """Lively rails lose little with speed: the wooden table and the professional one."""
 

@@ -21,7 +21,7 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
     Args:
         scenario: its name, or a scenario object.
         render_mode: None, "rgb_array" or "human".
-        camera: of its pictures: "top", or one of the backend's cameras.
+        viewpoint: Viewpoint of its pictures: "top", or one of the backend's.
         **keywords: see `make.build_world`.
 
     Raises:
@@ -34,10 +34,10 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         self,
         scenario: str | Scenario,
         render_mode: str | None = None,
-        camera: str = "top",
+        viewpoint: str = "top",
         **keywords: Unpack[Keywords],
     ) -> None:
-        self.parallel = AirHockeyEnv(scenario, render_mode, camera, **keywords)
+        self.parallel = AirHockeyEnv(scenario, render_mode, viewpoint, **keywords)
         check_one_open(self.parallel.world)
         self.agent = self.parallel.possible_agents[0]
         self.render_mode = render_mode
@@ -105,10 +105,10 @@ class AirHockeyGoalEnv(AirHockeySingleEnv):
 def make_single(
     scenario: str | Scenario,
     render_mode: str | None = None,
-    camera: str = "top",
+    viewpoint: str = "top",
     **keywords: Unpack[Keywords],
 ) -> AirHockeySingleEnv:
     """Build the environment, as ``gymnasium.make`` asks for it."""
     dicts = keywords.get("goals") == "dict"
     kind = AirHockeyGoalEnv if dicts else AirHockeySingleEnv
-    return kind(scenario, render_mode, camera, **keywords)
+    return kind(scenario, render_mode, viewpoint, **keywords)

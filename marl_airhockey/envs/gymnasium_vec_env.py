@@ -181,11 +181,11 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
 
     def _infos(self, result: StepResult | None = None) -> dict[str, Any]:
         result = result or self.world.empty_result()
-        retired = self.world.retired
-        if retired is None:
+        eliminated = self.world.eliminated
+        if eliminated is None:
             alive = np.ones(self.num_envs, np.bool_)
         else:
-            alive = ~retired[:, self.world.open[0]]
+            alive = ~eliminated[:, self.world.open[0]]
         return dict(infos_of(result, self.world, alive))
 
     def render(self) -> tuple[Array, ...]:

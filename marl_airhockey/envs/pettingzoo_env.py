@@ -44,7 +44,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     Args:
         scenario: its name, or a scenario object.
         render_mode: None, "rgb_array" or "human".
-        camera: of its pictures: "top", or one of the backend's cameras.
+        viewpoint: Viewpoint of its pictures: "top", or one of the backend's.
         **keywords: see `make.build_world`.
     """
 
@@ -60,7 +60,7 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         self,
         scenario: str | Scenario,
         render_mode: str | None = None,
-        camera: str = "top",
+        viewpoint: str = "top",
         **keywords: Unpack[Keywords],
     ) -> None:
         self.world = build_world(scenario, 1, autoreset=False, keywords=keywords)
@@ -75,7 +75,9 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
             from marl_airhockey.render.renderer import Renderer
 
             title = game.name.replace("_", " ")
-            self._renderer = Renderer(self.world, render_mode, title, camera=camera)
+            self._renderer = Renderer(
+                self.world, render_mode, title, viewpoint=viewpoint
+            )
         self.possible_agents = [f"paddle_{i}" for i in self.world.open]
         self.agents: list[str] = []
         observer = self.world.observer
@@ -245,8 +247,8 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         return {a: observation[0, i] for i, a in agents}
 
     def _infos(self, result: StepResult) -> dict[str, dict[str, Any]]:
-        world, retired = self.world, self.world.retired
-        out = [] if retired is None else retired[0, world.open].tolist()
+        world, eliminated = self.world, self.world.eliminated
+        out = [] if eliminated is None else eliminated[0, world.open].tolist()
         return {
             agent: info_of(result, world, i, not (out and out[i]))
             for i, agent in enumerate(self.agents)

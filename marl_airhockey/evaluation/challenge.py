@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
-from marl_airhockey.evaluation.card import Card, Result
+from marl_airhockey.evaluation.challenge_report import ChallengeReport, Result
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
@@ -37,7 +37,7 @@ EPISODES, GAMES = 200, 100
 SEED = 6_000_000
 """Seed of the first episode and of the first game
 
-Whoever changes anything above raises `card.PROTOCOL`."""
+Whoever changes anything above raises `challenge_report.PROTOCOL`."""
 
 
 def find_player(given: str, scenario: str, profile: str) -> str:
@@ -68,7 +68,7 @@ def play_challenge(
     episodes: int = EPISODES,
     games: int = GAMES,
     report: Callable[[Result], None] = lambda result: None,
-) -> Card:
+) -> ChallengeReport:
     """Play the protocol.
 
     Args:
@@ -95,7 +95,7 @@ def play_challenge(
         report(result)
     if not any(result.player for result in results):
         raise ValueError(f"{given}: it plays none of it; {results[0].note}")
-    return Card(name, version, episodes, games, files, tuple(results))
+    return ChallengeReport(name, version, episodes, games, files, tuple(results))
 
 
 def _play(

@@ -140,10 +140,10 @@ def play_games(
     for step_number in count(1):
         roster.ask(actions)
         step = world.step(actions)
-        retired, now = world.retired, world.state.time[:, None]
-        if retired is not None:
+        eliminated, now = world.eliminated, world.state.time[:, None]
+        if eliminated is not None:
             out = np.stack(
-                [retired[:, teams == t].all(-1) for t in np.unique(teams)], 1
+                [eliminated[:, teams == t].all(-1) for t in np.unique(teams)], 1
             )
             out &= playing[:, None]
             lasted = np.where(out, np.minimum(lasted, now), lasted)

@@ -12,7 +12,7 @@ import numpy as np
 
 from marl_airhockey.evaluation.stats import (
     interval,
-    unbeaten_mixture,
+    nash_mixture,
     without_nan,
 )
 from marl_airhockey.types import Array
@@ -68,13 +68,13 @@ class Standings:
     def mixture(self) -> Array:
         """(E,) shares of the players in the mixture that none of them beats.
 
-        Who beats all others has all of it; in a circle all have a part. See
-        `stats.unbeaten_mixture`.
+        Who beats all others has all of it; in a cycle all have a part. See
+        `stats.nash_mixture`.
         """
-        return unbeaten_mixture(np.nan_to_num(self.score, nan=0.5))
+        return nash_mixture(np.nan_to_num(self.score, nan=0.5))
 
     @property
-    def circles(self) -> list[tuple[str, str, str]]:
+    def cycles(self) -> list[tuple[str, str, str]]:
         """Triples in which each beats the next, and the last the first, with 95 %."""
         beats = np.zeros(self.score.shape, np.bool_)
         for a, b in permutations(range(len(self.names)), 2):
@@ -112,7 +112,7 @@ class Standings:
         ]
 
     def to_json(self) -> dict[str, Any]:
-        """Return table, scores and circles as a JSON object, the best player first."""
+        """Return table, scores and cycles as a JSON object, the best player first."""
         order = self.order
         data = {
             "scenario": self.scenario,
@@ -122,13 +122,13 @@ class Standings:
             "score": self.score[np.ix_(order, order)].tolist(),
             "score_intervals": self.score_intervals[np.ix_(order, order)].tolist(),
             "goal_difference": self.margin[np.ix_(order, order)].tolist(),
-            "circles": self.circles,
+            "cycles": self.cycles,
         }
         found: dict[str, Any] = without_nan(data)
         return found
 
     def to_markdown(self) -> str:
-        """Return the table and the circles as Markdown."""
+        """Return the table and the cycles as Markdown."""
         lines = [
             f"# League of {self.scenario}: {self.games} games of each pair",
             "",
@@ -143,7 +143,7 @@ class Standings:
                 f"{r['nash_score']:.3f} | {r['wins']} | {r['draws']} | {r['losses']} | "
                 f"{r['goal_difference']:+.2f} |"
             )
-        lines += ["", *(f"Circle: {' > '.join((*c, c[0]))}" for c in self.circles)]
+        lines += ["", *(f"Cycle: {' > '.join((*c, c[0]))}" for c in self.cycles)]
         return "\n".join(lines).rstrip() + "\n"
 
     def save(self, folder: Path) -> list[Path]:

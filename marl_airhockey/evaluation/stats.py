@@ -94,7 +94,7 @@ def elo(score: Array, games: Array) -> Array:
     return np.asarray(1000.0 + 400.0 * np.log10(share))
 
 
-def unbeaten_mixture(score: Array, temperature: float = 0.003) -> Array:
+def nash_mixture(score: Array, temperature: float = 0.003) -> Array:
     """Return the mixture of E players that no player beats: Nash averaging.
 
     Of all equilibria of the game in which both sides choose a player it is, nearly, the

@@ -27,7 +27,7 @@ def show_episodes(
     video: Path | None = None,
     width: int = 640,
     seconds: float = float("inf"),
-    camera: str = TOP,
+    viewpoint: str = TOP,
 ) -> list[Array]:
     """Play some episodes with ``driver`` at ``paddle_0`` and show them.
 
@@ -40,7 +40,7 @@ def show_episodes(
         video: .gif or .mp4 to write; None opens a window.
         width: width of the video, pixels.
         seconds: time after which an episode is cut, s.
-        camera: "top", or one of the backend's cameras.
+        viewpoint: "top", or one of the backend's viewpoints.
 
     Returns:
         The pictures (H, W, 3) uint8 of the video; an empty list for a window.
@@ -58,7 +58,7 @@ def show_episodes(
     world = build_driven_world(driver, scenario, 1, keywords)
     mode = "human" if video is None else "rgb_array"
     title = world.scenario.name.replace("_", " ")
-    renderer = Renderer(world, mode, title, camera=camera)
+    renderer = Renderer(world, mode, title, viewpoint=viewpoint)
     fps = 1 / world.control_dt
     pictures: list[Array] = []
     for episode in range(episodes):

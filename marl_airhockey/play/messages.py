@@ -32,7 +32,7 @@ def drawn(
         returns: (seats,)
         success: (seats,) bool
     """
-    retired = scenario.retired(memory)
+    eliminated = scenario.eliminated(memory)
     return {
         "time": round(float(state.time), 3),
         "paddles": rounded(state.paddle),
@@ -47,7 +47,7 @@ def drawn(
         "caption": scenario.caption(memory),
         "returns": rounded(returns),
         "success": np.flatnonzero(success).tolist(),
-        "retired": [] if retired is None else np.flatnonzero(retired).tolist(),
+        "eliminated": [] if eliminated is None else np.flatnonzero(eliminated).tolist(),
     }
 
 

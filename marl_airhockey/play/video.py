@@ -41,7 +41,7 @@ def write_recording_video(
     for n in range(every, len(episode) + 1, every):
         state = states.map(lambda x, n=n: x[n])  # type: ignore[misc]
         memory = {name: value[n] for name, value in memories.items()}
-        retired = scenario.retired(memory)
+        eliminated = scenario.eliminated(memory)
         trails = states.puck[max(n + 1 - Renderer.TRAIL, 1) : n + 1]
         frame = Frame(
             scene=scenario.scene,
@@ -52,7 +52,7 @@ def write_recording_video(
             note=f"{scenario.caption(memory)}   {float(state.time):4.1f} s",
             clock=n / cycles,
             success=bool(success[n - 1].any()),
-            retired=() if retired is None else retired.tolist(),
+            eliminated=() if eliminated is None else eliminated.tolist(),
         )
         pictures.append(draw(frame, width))
     write_video(video, pictures, 1 / (every * dt))

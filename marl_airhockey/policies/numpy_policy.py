@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from marl_airhockey.policies.card import current_card
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ class NumpyPolicy:
         """
         try:
             arrays = _read(path)
-            card = json.loads(str(arrays.pop("card")))
+            card = current_card(json.loads(str(arrays.pop("card"))))
             count = sum(name.startswith("weight_") for name in arrays)
             pairs = [(arrays[f"weight_{i}"], arrays[f"bias_{i}"]) for i in range(count)]
             parts = arrays["centre"], arrays["unit"], arrays["log_std"]

@@ -56,7 +56,7 @@ class Frame:
     clock: float = 0.0
     """Share of the episode that is over, 0 to 1"""
     success: bool = False
-    retired: Sequence[bool] = ()
+    eliminated: Sequence[bool] = ()
     """Flags of the seats that are out of the game; empty if seats cannot retire"""
 
 
@@ -98,7 +98,9 @@ def _table(canvas: Canvas, frame: Frame) -> None:
         canvas.polygon(reach, _pale(_seat_colour(scene, i), 0.86), 1)
     for goal_line in scene.goal_lines:
         owner = sides.index(goal_line.side) if goal_line.side in sides else 0
-        if goal_line.width is None or (any(frame.retired) and frame.retired[owner]):
+        if goal_line.width is None or (
+            any(frame.eliminated) and frame.eliminated[owner]
+        ):
             continue
         near, out = scene.opening(goal_line), -0.04 * table.normals[goal_line.side]
         gap = np.array([*near, *(near + out)[::-1]])

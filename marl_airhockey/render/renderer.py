@@ -24,10 +24,10 @@ class Renderer:
         mode: "rgb_array" or "human".
         title: text at the left of the title bar.
         index: number of the world that is shown.
-        camera: `TOP`, or one of the backend's cameras.
+        viewpoint: `TOP`, or one of the backend's viewpoints.
 
     Raises:
-        ValueError: unknown mode or camera, with the names there are.
+        ValueError: unknown mode or viewpoint, with the names there are.
     """
 
     MODES = ("rgb_array", "human")
@@ -35,15 +35,15 @@ class Renderer:
     """Longest trail of a puck, control steps"""
 
     def __init__(
-        self, world: World, mode: str, title: str, index: int = 0, camera: str = TOP
+        self, world: World, mode: str, title: str, index: int = 0, viewpoint: str = TOP
     ) -> None:
         if mode not in self.MODES:
             raise ValueError(unknown_name("render_mode", mode, self.MODES))
-        cameras = (TOP, *world.backend.cameras)
-        if camera not in cameras:
-            raise ValueError(unknown_name("camera", camera, cameras))
+        viewpoints = (TOP, *world.backend.viewpoints)
+        if viewpoint not in viewpoints:
+            raise ValueError(unknown_name("viewpoint", viewpoint, viewpoints))
         self.world, self.mode, self.title = world, mode, title
-        self.index, self.camera = index, camera
+        self.index, self.viewpoint = index, viewpoint
         self._window: Window | None = None
         self.begin()
 
@@ -70,7 +70,7 @@ class Renderer:
         world, i = self.world, self.index
         state = world.state.map(lambda x: x[i])
         memory = {name: value[i] for name, value in world.memory.items()}
-        episode, retired = world.episode, world.scenario.retired(memory)
+        episode, eliminated = world.episode, world.scenario.eliminated(memory)
         note = f"{world.scenario.caption(memory)}   {float(state.time):4.1f} s"
         if len(world.scene.seats) == 1:
             note += f"   return {episode.returns[i, 0]:+.2f}"
@@ -83,16 +83,16 @@ class Renderer:
             note=note,
             clock=episode.cycles[i] / world.max_cycles,
             success=bool(episode.success[i].any()),
-            retired=() if retired is None else retired.tolist(),
+            eliminated=() if eliminated is None else eliminated.tolist(),
         )
 
     def take_picture(self, width: int = WIDTH) -> Array:
         """Return a picture (H, W, 3) uint8 RGB, ``width`` pixels wide, as it is now."""
         frame = self.frame()
-        if self.camera == TOP:
+        if self.viewpoint == TOP:
             return draw(frame, width)
         backend = self.world.backend
-        return backend.photograph(self.index, self.camera, frame.marks, width)
+        return backend.photograph(self.index, self.viewpoint, frame.marks, width)
 
     def show(self) -> Array | None:
         """Return the picture; in human mode put it on the window and return None.

@@ -37,12 +37,12 @@ class OwnPaddle(Observable):
         columns += scope.velocity_columns("own", scope.top_speed, scope.top_speed)
         if scope.observe != "velocity":
             for ago in range(PENDING, 0, -1):
-                names = (f"own.asked[-{ago}].{axis}" for axis in "xy")
+                names = (f"own.requested[-{ago}].{axis}" for axis in "xy")
                 columns += [Column(name, -1.0, 1.0, 1.0) for name in names]
         if scope.reaction:
-            columns += scope.position_columns("own.then", (0.2, 0.2), centre)
+            columns += scope.position_columns("own.delayed", (0.2, 0.2), centre)
             columns += scope.velocity_columns(
-                "own.then", scope.top_speed, scope.top_speed
+                "own.delayed", scope.top_speed, scope.top_speed
             )
         return columns
 
@@ -54,7 +54,7 @@ class OwnPaddle(Observable):
             actions, end = ego.requested.swapaxes(-2, -3), 4 + 2 * PENDING
             out[..., 4:end] = actions.reshape(*actions.shape[:-2], -1)
         if ego.scope.reaction:
-            out[..., end : end + 2], out[..., end + 2 :] = ego.own_then
+            out[..., end : end + 2], out[..., end + 2 :] = ego.own_delayed
 
 
 @dataclass(frozen=True)
@@ -99,11 +99,12 @@ def _others(scene: Scene) -> Array:
 
 @dataclass(frozen=True)
 class Pucks(Observable):
-    """Position, velocity and spin of every puck (now: by free flight), or its history.
+    """Position, velocity and spin of every puck, or its history.
 
-    What would be now is there with a reaction, see `reckoning.reckon`. An estimate has
-    visibility and age (s) of the newest frame besides. The spin is the speed of the
-    edge, radius times angular velocity, counter-clockwise.
+    With a reaction time, position and velocity predicted for now by free flight follow,
+    see `extrapolation.extrapolate`. An estimate has visibility and age (s) of the
+    newest frame in addition. The spin is the speed of the edge, radius times angular
+    velocity, counter-clockwise.
     """
 
     def columns(self, scope: ObservationContext) -> list[Column]:
@@ -118,9 +119,9 @@ class Pucks(Observable):
             columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
             most = PUCK_SPEED_CAP
             columns.append(Column(f"puck_{i}.spin", -most, most, 0.5))
-            if scope.reckons:
-                columns += scope.position_columns(f"puck_{i}.now", (0.67, 0.25))
-                columns += scope.velocity_columns(f"puck_{i}.now", most, 1.4)
+            if scope.extrapolates:
+                columns += scope.position_columns(f"puck_{i}.predicted", (0.67, 0.25))
+                columns += scope.velocity_columns(f"puck_{i}.predicted", most, 1.4)
             if scope.observe == "estimate":
                 columns += _frame_columns(f"puck_{i}")
         return columns
@@ -128,13 +129,13 @@ class Pucks(Observable):
     def write(self, ego: EgoView, out: Array) -> None:
         if ego.scope.observe != "history":
             pucks = ego.scope.scene.pucks
-            size, (place, motion) = out.shape[-1] // pucks, ego.puck_now
+            size, (place, motion) = out.shape[-1] // pucks, ego.puck_predicted
             for i in range(pucks):
                 part = out[..., size * i : size * (i + 1)]
                 part[..., :2] = ego.puck[..., i, :]
                 part[..., 2:4] = ego.puck_velocity[..., i, :]
                 part[..., 4] = ego.puck_edge[..., i]
-                if ego.scope.reckons:
+                if ego.scope.extrapolates:
                     part[..., 5:7] = place[..., i, :]
                     part[..., 7:9] = motion[..., i, :]
                 if ego.scope.observe == "estimate":
@@ -162,7 +163,7 @@ class OwnToPucks(Observable):
         return [c for name in names for c in scope.offset_columns(name, (0.25, 0.125))]
 
     def write(self, ego: EgoView, out: Array) -> None:
-        out[...] = (ego.puck_now[0] - ego.own[..., None, :]).reshape(out.shape)
+        out[...] = (ego.puck_predicted[0] - ego.own[..., None, :]).reshape(out.shape)
 
 
 @dataclass(frozen=True)

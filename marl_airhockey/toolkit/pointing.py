@@ -32,7 +32,7 @@ def point_to(
         target: (2,) or (B, 2), ego frame, m.
         moving: velocity of the targets (2,) or (B, 2), m/s; None at rest.
         lag: time by which the paddle answers late, s. It would go on by so much if it
-            were stopped now, and swings about the target if nobody reckons with it.
+            were stopped now, and swings about the target if nobody compensates for it.
     """
     gain = min(GAIN, STEADY / lag) if lag else GAIN
     way = target - view.state.paddle[:, view.seat]

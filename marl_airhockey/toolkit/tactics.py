@@ -13,9 +13,9 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.extrapolation import Walls, extrapolate_rows
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
-from marl_airhockey.core.reckoning import Walls, reckon_rows
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
@@ -27,7 +27,7 @@ class Skill(NamedTuple):
     pace: float
     """Largest share of the top speed that it commands"""
     lag: float
-    """Time by which it reckons pucks later than they are (s)"""
+    """Time by which it predicts pucks too late (s)"""
 
 
 STRENGTHS = {
@@ -111,12 +111,12 @@ def nearest_puck(view: View, field: Field, lag: float) -> tuple[Array, Array]:
     """Reckon place and velocity (W, 2) of the puck that is, or will be, nearest.
 
     Pucks are brought forward over the reaction of the game, less ``lag``, see
-    `reckoning.reckon_rows`; a longer lag takes them straight back.
+    `extrapolation.extrapolate_rows`; a longer lag takes them straight back.
     """
     place, motion = view.state.puck, view.state.puck_velocity
     ahead = view.reaction - lag
     if ahead > 0.0:
-        place, motion = reckon_rows(place, motion, ahead, field.walls)
+        place, motion = extrapolate_rows(place, motion, ahead, field.walls)
     else:
         place = place + ahead * motion
     which = (place[..., 0] + 0.4 * motion[..., 0]).argmin(-1)
@@ -131,7 +131,7 @@ def guard(view: View, field: Field, depth: float, lag: float) -> Array:
         view: view of the seat.
         field: see `Field`.
         depth: distance of the line from the near edge of the reach, m.
-        lag: time by which pucks are reckoned later than they are, s.
+        lag: Time by which pucks are predicted too late, s.
     """
     line = view.reach[:, 0].min() + depth
     place, motion = nearest_puck(view, field, lag)
@@ -241,7 +241,7 @@ def attack(
         field: see `Field`.
         aim: (W, 2) m.
         pace: largest share of top speed.
-        lag: time by which pucks are reckoned later than they are, s.
+        lag: Time by which pucks are predicted too late, s.
 
     Returns:
         Velocities (W, 2), m/s, and times to the strike (W,), s, infinite where the puck

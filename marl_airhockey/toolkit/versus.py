@@ -175,7 +175,7 @@ class Versus(Scenario):
 
         It has more goals or, of as many, more shots on goal.
         """
-        over = self.terminated(t) | t.last
+        over = self.terminated(t) | t.time_limit_reached
         return np.asarray(
             (over[..., None] & self._leads(t.new_memory))[..., self.teams]
         )

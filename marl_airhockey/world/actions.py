@@ -1,4 +1,4 @@
-"""Actions of all seats in a step: open, driven and retired ones."""
+"""Actions of all seats in a step: open, driven and eliminated ones."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Actions:
     """Collector of the actions of B worlds, which delays them by the physics.
 
     Args:
-        scenario: Scenario, which says which seats are retired.
+        scenario: Scenario, which says which seats are eliminated.
         driven: Seats with drivers inside the environment.
         open_seats: Indices (open,) of the other seats.
         physics: Ranges of the action latency.
@@ -63,7 +63,7 @@ class Actions:
         scene, longest = scenario.scene, physics.highest("action_delay")
         self._scenario, self._driven, self._open = scenario, driven, open_seats
         self._rotations = [scene.table.rotation(seat.side) for seat in scene.seats]
-        self._retirement = _Retirement(scene)
+        self._elimination = _Elimination(scene)
         self._shape = (worlds, len(open_seats), 2)
         self.inputs = Inputs.empty(scene, worlds)
         """Inputs of the step, as `collect` leaves them."""
@@ -120,9 +120,9 @@ class Actions:
                 requested[:, k] = seat.act(sensed, memory, values, cycles)
             else:
                 self._position(k, measured)
-        retired = self._scenario.retired(memory)
-        if retired is not None and retired.any():
-            self._retirement.apply(retired, inputs)
+        eliminated = self._scenario.eliminated(memory)
+        if eliminated is not None and eliminated.any():
+            self._elimination.apply(eliminated, inputs)
             self._positioned = True
         if self._delay is None:
             return requested
@@ -144,8 +144,8 @@ class Actions:
         prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
 
 
-class _Retirement:
-    """Positions of retired paddles, behind their sides, and the goals that they own."""
+class _Elimination:
+    """Positions of eliminated paddles, behind their sides, and their goal lines."""
 
     def __init__(self, scene: Scene) -> None:
         table, sides = scene.table, [seat.side for seat in scene.seats]
@@ -156,9 +156,9 @@ class _Retirement:
         owners = [sides.index(side) if side in sides else -1 for side in lines]
         self._owner = np.array(owners, np.int64)
 
-    def apply(self, retired: Array, inputs: Inputs) -> None:
-        """Remove the paddles of retired seats (B, seats) and close their goals."""
-        inputs.action[retired], inputs.raised[retired] = 0.0, True
+    def apply(self, eliminated: Array, inputs: Inputs) -> None:
+        """Remove the paddles of eliminated seats (B, seats) and close their goals."""
+        inputs.action[eliminated], inputs.raised[eliminated] = 0.0, True
         parking = np.broadcast_to(self._parking, inputs.prescribed.shape)
-        inputs.prescribed[retired] = parking[retired]
-        inputs.closed[:] = retired[:, self._owner] & (self._owner >= 0)
+        inputs.prescribed[eliminated] = parking[eliminated]
+        inputs.closed[:] = eliminated[:, self._owner] & (self._owner >= 0)

@@ -12,7 +12,7 @@ from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array
 
 
-class Selected(Mapping[str, Array]):
+class PhysicsRows(Mapping[str, Array]):
     """Parameters of some worlds: those of all by name, of which rows are taken."""
 
     def __init__(self, physics: Mapping[str, Array], worlds: Array) -> None:

@@ -32,7 +32,7 @@ from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
-from marl_airhockey.world.episode import Episode, Selected
+from marl_airhockey.world.episode import Episode, PhysicsRows
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.referee import Referee
 from marl_airhockey.world.set_state import checked_memory, settled
@@ -178,9 +178,9 @@ class World:
             raise RuntimeError(f"{call}: this environment is closed; build another")
 
     @property
-    def retired(self) -> Array | None:
+    def eliminated(self) -> Array | None:
         """(B, seats) bool: True for seats that have left the game; None if none can."""
-        return self.scenario.retired(self._memory)
+        return self.scenario.eliminated(self._memory)
 
     def seed(self, seed: int | Sequence[int] | None = None) -> None:
         """Set the seeds of the worlds from the next `reset` on.
@@ -278,8 +278,8 @@ class World:
         self, rng: RandomStreams, rows: State, memory: Memory, worlds: Array
     ) -> Memory:
         """Return the memory of episodes that begin, with what their physics decides."""
-        physics = Selected(self._episode.physics, worlds)
-        return self.scenario.aim(rng, rows, memory, physics)
+        physics = PhysicsRows(self._episode.physics, worlds)
+        return self.scenario.finalize_goals(rng, rows, memory, physics)
 
     def _key_scatter(self, worlds: Array) -> None:
         """Let equal states of an episode have the same future, scatter and all."""

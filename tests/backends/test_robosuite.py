@@ -346,7 +346,7 @@ def test_arms_differ_from_world_to_world():
         ah.make_world("juggle", backend="numba", physics={"arm_force": 30.0})
 
 
-def test_it_is_seen_from_three_cameras():
+def test_it_is_seen_from_three_viewpoints():
     env = ah.parallel_env("hit_goal", "rgb_array", "agentview", backend="robosuite")
     env.reset(seed=0)
     try:
@@ -356,9 +356,9 @@ def test_it_is_seen_from_three_cameras():
     assert picture.shape == (528, 880, 3)
     assert picture.std() > 20
     env.close()
-    with pytest.raises(ValueError, match=r"unknown camera 'agentview'.*top"):
+    with pytest.raises(ValueError, match=r"unknown viewpoint 'agentview'.*top"):
         ah.parallel_env("hit_goal", "rgb_array", "agentview")
-    with pytest.raises(ValueError, match=r"unknown camera 'sky'.*birdview"):
+    with pytest.raises(ValueError, match=r"unknown viewpoint 'sky'.*birdview"):
         ah.parallel_env("hit_goal", "rgb_array", "sky", backend="robosuite")
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from marl_airhockey.evaluation import challenge
-from marl_airhockey.evaluation.card import Card
 from marl_airhockey.evaluation.challenge import find_player, play_challenge
+from marl_airhockey.evaluation.challenge_report import ChallengeReport
 
 
 @pytest.fixture(autouse=True)
@@ -35,7 +35,7 @@ def test_the_zoo_has_a_card(tmp_path):
     assert mean == pytest.approx(sum(r.score for r in card.results[:4]) / 4)
     assert low < mean <= high
     files = card.save(tmp_path)
-    assert Card.from_json(files[0].read_text()) == card
+    assert ChallengeReport.from_json(files[0].read_text()) == card
     assert "| reach | ur5e | reach_ur5e.npz | " in files[1].read_text()
     assert files[2].stat().st_size > 10_000
 
@@ -67,6 +67,6 @@ def test_a_policy_for_a_profile_comes_first(tmp_path):
 def test_cards_of_other_protocols_are_refused():
     card = replace(play_challenge("reacher", "reacher", "0", 2, 2), protocol=0)
     with pytest.raises(ValueError, match="protocol 0"):
-        Card.from_json(card.to_json())
+        ChallengeReport.from_json(card.to_json())
     with pytest.raises(ValueError, match="no card"):
-        Card.from_json(json.dumps({"name": "x"}))
+        ChallengeReport.from_json(json.dumps({"name": "x"}))

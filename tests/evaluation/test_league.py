@@ -7,7 +7,7 @@ import pytest
 
 from marl_airhockey.evaluation.games import GameResults
 from marl_airhockey.evaluation.league import compared, league, lineups_of
-from marl_airhockey.evaluation.stats import elo, unbeaten_mixture
+from marl_airhockey.evaluation.stats import elo, nash_mixture
 from marl_airhockey.registry import make_agent
 
 SHORT = {"options": {"seconds": 6.0}, "backend": "numba"}
@@ -33,13 +33,13 @@ def test_a_league_rates_and_names_its_files(tmp_path):
         league("duel", {"still": players["still"]}, games=2)
 
 
-def test_a_circle_is_named():
+def test_a_cycle_is_named():
     standings = league("duel", ("still", "random"), games=2)
     wins = np.array([[0, 90, 5], [5, 0, 90], [90, 5, 0]])
     three = type(standings)(
         "duel", ("a", "b", "c"), 100, wins, np.full((3, 3), 5), *np.zeros((3, 3, 3))
     )
-    assert three.circles == [("a", "b", "c")]
+    assert three.cycles == [("a", "b", "c")]
 
 
 def test_places_are_of_winners_then_of_who_was_out_later_then_of_margins():
@@ -109,15 +109,15 @@ def test_ratings_by_places_are_those_of_a_plackett_luce_model():
 
 def test_nobody_beats_the_mixture():
     circle = np.array([[0.5, 0.8, 0.2], [0.2, 0.5, 0.8], [0.8, 0.2, 0.5]])
-    np.testing.assert_allclose(unbeaten_mixture(circle), 1 / 3, atol=1e-6)
+    np.testing.assert_allclose(nash_mixture(circle), 1 / 3, atol=1e-6)
     ladder = np.array([[0.5, 0.7, 0.9], [0.3, 0.5, 0.7], [0.1, 0.3, 0.5]])
-    assert unbeaten_mixture(ladder).tolist() == [1.0, 0.0, 0.0]
+    assert nash_mixture(ladder).tolist() == [1.0, 0.0, 0.0]
     # A copy of a player shares its part.
     rows = [0, 1, 2, 2]
-    shares = unbeaten_mixture(circle[np.ix_(rows, rows)])
+    shares = nash_mixture(circle[np.ix_(rows, rows)])
     np.testing.assert_allclose(shares, [1 / 3, 1 / 3, 1 / 6, 1 / 6], atol=4e-3)
     assert shares[2] == shares[3]
     rng = np.random.default_rng(1)
     edge = rng.uniform(-0.5, 0.5, (6, 6))
     score = 0.5 + np.triu(edge, 1) - np.triu(edge, 1).T
-    assert (score @ unbeaten_mixture(score)).max() < 0.53
+    assert (score @ nash_mixture(score)).max() < 0.53

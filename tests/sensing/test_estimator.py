@@ -128,7 +128,12 @@ def test_the_observation_shows_the_estimate_the_frame_and_pending_actions():
     labels = list(world.observer.labels)
     assert labels[:8] == [
         *("own.x", "own.y", "own.vx", "own.vy"),
-        *("own.asked[-2].x", "own.asked[-2].y", "own.asked[-1].x", "own.asked[-1].y"),
+        *(
+            "own.requested[-2].x",
+            "own.requested[-2].y",
+            "own.requested[-1].x",
+            "own.requested[-1].y",
+        ),
     ]
     begin = labels.index("puck_0.x")
     names = ("x", "y", "vx", "vy", "spin", "seen", "age")

@@ -38,15 +38,15 @@ def test_pucks_and_others_are_late_and_the_own_paddle_is_not():
     for k, seen in enumerate(shown):
         now, then = direct[k], direct[max(k - STEPS, 0)]
         for i, label in enumerate(world.observer.labels):
-            if label.startswith("own.then."):
-                wanted = part(prompt, then, label.replace(".then", ""))
+            if label.startswith("own.delayed."):
+                wanted = part(prompt, then, label.replace(".delayed", ""))
             elif label.startswith("own."):
                 wanted = part(prompt, now, label)
             elif label.startswith("own_to_puck_0.d"):
-                puck = part(world, seen, f"puck_0.now.{label[-1]}")
+                puck = part(world, seen, f"puck_0.predicted.{label[-1]}")
                 wanted = puck - part(prompt, now, f"own.{label[-1]}")
-            elif ".now." in label:
-                continue  # see test_reckoning
+            elif ".predicted." in label:
+                continue  # see test_extrapolation
             else:
                 wanted = part(prompt, then, label)
             np.testing.assert_allclose(seen[..., i], wanted, atol=1e-6, err_msg=label)
@@ -59,8 +59,8 @@ def test_every_form_is_late_in_a_profile_that_senses(observe):
     shown, direct = play(world, 20), play(prompt, 20)
     labels = world.observer.labels
     seen_late = [n for n in labels if n.startswith(("puck_0", "other_0"))]
-    assert ("puck_0.now.x" in seen_late) == (observe != "history")
-    seen_late = [name for name in seen_late if ".now." not in name]
+    assert ("puck_0.predicted.x" in seen_late) == (observe != "history")
+    seen_late = [name for name in seen_late if ".predicted." not in name]
     assert len(seen_late) > 6
     for name in seen_late:
         for k in range(STEPS, 21):

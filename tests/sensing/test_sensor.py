@@ -196,8 +196,8 @@ def test_a_history_shows_ages_and_the_actions_on_their_way():
     world.step(asked)
     shown = world.step(-asked).observation
     named = dict(zip(world.observer.layout.labels, shown[1, 0], strict=True))
-    assert named["own.asked[-2].x"] == np.float32(-0.5)
-    assert named["own.asked[-1].y"] == np.float32(-0.1)
+    assert named["own.requested[-2].x"] == np.float32(-0.5)
+    assert named["own.requested[-1].y"] == np.float32(-0.1)
     assert 0.025 <= named["puck_0[-0].age"] <= 0.0617
 
 

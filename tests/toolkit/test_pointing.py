@@ -33,6 +33,6 @@ def test_it_comes_to_rest_there(lag, physics):
     assert off[40:].max() < 0.004
 
 
-def test_without_reckoning_a_late_paddle_swings():
+def test_without_prediction_a_late_paddle_swings():
     off = np.linalg.norm(places(ah.make_agent("mouse"), SERVO), axis=1)
     assert off[40:].max() > 0.004

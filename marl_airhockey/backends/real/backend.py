@@ -59,7 +59,7 @@ class RealBackend(Backend):
     tracks_commands: ClassVar[bool] = False
     senses_itself: ClassVar[bool] = True
     timestep: ClassVar[float | None] = None
-    cameras: ClassVar[tuple[str, ...]] = ("table", "rectified")
+    viewpoints: ClassVar[tuple[str, ...]] = ("table", "rectified")
 
     def __init__(
         self,
@@ -338,12 +338,12 @@ class RealBackend(Backend):
         }
 
     def photograph(
-        self, world: int, camera: str, marks: Sequence[Mark], width: int
+        self, world: int, viewpoint: str, marks: Sequence[Mark], width: int
     ) -> Array:
         frame = self._camera.newest
         if frame is None:
             raise RuntimeError(self._camera.trouble or "camera: no picture yet")
-        if camera == "rectified":
+        if viewpoint == "rectified":
             return self.rectifier.rectify(frame.image, width)[..., ::-1]
         status = self.robot.status
         paddle = np.array([status.x, status.y])

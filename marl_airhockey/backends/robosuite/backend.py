@@ -25,7 +25,7 @@ from marl_airhockey.jit.threads import over_rows
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
-    from marl_airhockey.backends.robosuite.camera import Camera
+    from marl_airhockey.backends.robosuite.offscreen import OffscreenRenderer
 
 NEWEST = "mujoco==3.9.0"
 """Newest release that robosuite works with."""
@@ -44,7 +44,7 @@ class RobosuiteBackend(Backend):
     instant_contacts: ClassVar[bool] = False
     tracks_commands: ClassVar[bool] = False
     timestep: ClassVar[float | None] = 0.001
-    cameras: ClassVar[tuple[str, ...]] = ("frontview", "agentview", "birdview")
+    viewpoints: ClassVar[tuple[str, ...]] = ("frontview", "agentview", "birdview")
 
     @classmethod
     def available(cls) -> str | None:
@@ -104,7 +104,7 @@ class RobosuiteBackend(Backend):
             for i in range(num_worlds)
         ]
         self._last_goal = np.zeros((num_worlds, len(scene.seats), 2))
-        self._cameras: dict[int, Camera] = {}
+        self._renderers: dict[int, OffscreenRenderer] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content of a copy, which opens its own OpenGL contexts."""
@@ -180,19 +180,21 @@ class RobosuiteBackend(Backend):
         return np.where(imposed[..., None], goal * slow, goal)
 
     def photograph(
-        self, world: int, camera: str, marks: Sequence[Mark], width: int
+        self, world: int, viewpoint: str, marks: Sequence[Mark], width: int
     ) -> Array:
-        from marl_airhockey.backends.robosuite.camera import Camera
+        from marl_airhockey.backends.robosuite.offscreen import OffscreenRenderer
 
-        if width not in self._cameras:
+        if width not in self._renderers:
             model, height = self.env.sim.model._model, round(width * 0.6)
-            self._cameras[width] = Camera(model, self.env.frame, width, height)
+            self._renderers[width] = OffscreenRenderer(
+                model, self.env.frame, width, height
+            )
         qpos = self.worlds[world].data.qpos
-        return self._cameras[width].picture(qpos, camera, marks)
+        return self._renderers[width].picture(qpos, viewpoint, marks)
 
     def close(self) -> None:
-        for camera in self._cameras.values():
-            camera.close()
+        for renderer in self._renderers.values():
+            renderer.close()
         self.env.close()
 
 

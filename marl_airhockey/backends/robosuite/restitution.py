@@ -52,7 +52,7 @@ def solref(restitution: float | Array, timestep: float) -> Array:
     """Return the direct solref (..., 2) of contacts with restitutions (...)."""
     ratio = np.interp(-np.asarray(restitution), -_SHARES, _RATIOS)
     # MuJoCo divides both by the impedance and applies a share of them. That were the
-    # impedance again, but the inverse mass that it reckons with is a mean over three
+    # impedance again, but the inverse mass that it uses is a mean over three
     # axes: two thirds of that of a body which slides along two.
     applied = IMPEDANCE / (IMPEDANCE + (1.0 - IMPEDANCE) * 2.0 / 3.0)
     scale = IMPEDANCE / applied

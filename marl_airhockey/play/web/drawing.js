@@ -89,7 +89,7 @@ function drawTable() {
     path(back); pen.strokeStyle = alpha(colour(i), 0.22); pen.stroke();
   });
   for (const goalLine of match.goal_lines) {
-    if (now.retired.includes(goalLine.owner)) continue;
+    if (now.eliminated.includes(goalLine.owner)) continue;
     const [a, b] = goalLine.ends, n = match.normals[goalLine.side];
     path([a, b, [b[0] - 0.04 * n[0], b[1] - 0.04 * n[1]], [a[0] - 0.04 * n[0], a[1] - 0.04 * n[1]]]);
     pen.fillStyle = colour(goalLine.owner); pen.fill();
@@ -138,7 +138,7 @@ function drawBodies(share) {
     pen.fillStyle = "#c9a26b"; pen.fill(); pen.strokeStyle = "#7d5f33"; pen.stroke();
   });
   now.paddles.forEach((p, i) => {
-    if (now.retired.includes(i)) return;
+    if (now.eliminated.includes(i)) return;
     const o = old.paddles[i] || p, own = i === now.seat && ownPaddle;
     const x = own ? ownPaddle.x : mix(o[0], p[0]), y = own ? ownPaddle.y : mix(o[1], p[1]);
     if (filmed()) { pen.lineWidth = Math.max(2, 0.006 * fit.scale); disc(x, y, match.paddle_radius, null, colour(i)); return; }

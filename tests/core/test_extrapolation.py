@@ -5,7 +5,7 @@ import pytest
 from situations import idle
 
 import marl_airhockey as ah
-from marl_airhockey.core.reckoning import Walls, reckon, reckon_rows
+from marl_airhockey.core.extrapolation import Walls, extrapolate, extrapolate_rows
 from marl_airhockey.core.table import Table
 from marl_airhockey.registry import make_scenario
 
@@ -19,7 +19,7 @@ def walls(restitution=0.5, friction=0.0, table=BOX):
 def test_free_pucks_go_straight_and_walls_return_a_share():
     place = np.array([(0.0, 0.0), (0.0, 0.3), (0.8, 0.0)])
     motion = np.array([(1.0, -0.5), (2.0, 1.0), (1.0, 0.0)])
-    there, moved = reckon(place, motion, 0.3, walls())
+    there, moved = extrapolate(place, motion, 0.3, walls())
     expected = [(0.3, -0.15), (0.6, 0.4 - 0.2 * 0.5), (0.9 - 0.2 * 0.5, 0.0)]
     np.testing.assert_allclose(there, expected, atol=1e-12)
     np.testing.assert_allclose(moved, [(1.0, -0.5), (2.0, -0.5), (-0.5, 0.0)])
@@ -27,20 +27,20 @@ def test_free_pucks_go_straight_and_walls_return_a_share():
 
 def test_friction_slows_along_a_wall_until_the_slip_ends():
     place, motion = np.array([(0.0, 0.4)]), np.array([(1.5, 1.0)])
-    _, slid = reckon(place, motion, 1e-9, walls(0.5, 0.1))
+    _, slid = extrapolate(place, motion, 1e-9, walls(0.5, 0.1))
     np.testing.assert_allclose(slid, [(1.5 - 0.1 * 1.5, -0.5)])
-    _, stuck = reckon(place, motion, 1e-9, walls(0.5, 1.0))
+    _, stuck = extrapolate(place, motion, 1e-9, walls(0.5, 1.0))
     np.testing.assert_allclose(stuck, [(1.0, -0.5)])
 
 
 def test_a_corner_returns_both_ways_and_a_long_flight_stays_inside():
     place, motion = np.array([(0.85, 0.35)]), np.array([(1.0, 1.0)])
-    there, moved = reckon(place, motion, 0.1, walls())
+    there, moved = extrapolate(place, motion, 0.1, walls())
     np.testing.assert_allclose(there, [(0.9 - 0.025, 0.4 - 0.025)])
     np.testing.assert_allclose(moved, [(-0.5, -0.5)])
     rng = np.random.default_rng(0)
     place = rng.uniform((-0.9, -0.4), (0.9, 0.4), (500, 2))
-    there, _ = reckon(place, rng.normal(0.0, 12.0, (500, 2)), 0.4, walls(0.9))
+    there, _ = extrapolate(place, rng.normal(0.0, 12.0, (500, 2)), 0.4, walls(0.9))
     assert (np.abs(there) <= (0.9 + 1e-9, 0.4 + 1e-9)).all()
 
 
@@ -57,7 +57,7 @@ def test_it_is_what_a_world_does_but_for_drag_and_spin(name, backend):
     rows.spin[:] = 0.0
     world.set_state(rows, kept)
     scene = world.scene
-    there, _ = reckon(rows.puck, rows.puck_velocity, 0.15, Walls.of(scene))
+    there, _ = extrapolate(rows.puck, rows.puck_velocity, 0.15, Walls.of(scene))
     free = np.ones(200, bool)
     for _ in range(3):
         idle(world, 0.05)
@@ -82,7 +82,7 @@ def test_seats_with_a_reaction_see_pucks_as_they_were_and_would_be_now():
     seen = [idle(world, 0.05)[0].observation for _ in range(3)][-1]
     labels = list(world.observer.layout.labels)
     place = [labels.index(f"puck_0.{axis}") for axis in "xy"]
-    now = [labels.index(f"puck_0.now.{axis}") for axis in "xy"]
+    now = [labels.index(f"puck_0.predicted.{axis}") for axis in "xy"]
     np.testing.assert_allclose(seen[:, 0, place], rows.puck[:, 0], atol=1e-6)
     missed = np.hypot(*(seen[:, 0, now] - world.state.puck[:, 0]).T)
     assert np.median(missed) < 0.003
@@ -99,8 +99,8 @@ def test_compiled_rows_equal_numpy(name):
     place = rng.uniform(-0.25, 0.25, (50, 2, 2))
     motion = rng.normal(0.0, 6.0, (50, 2, 2))
     for got, expected in zip(
-        reckon_rows(place, motion, 0.3, sides),
-        reckon(place, motion, 0.3, sides),
+        extrapolate_rows(place, motion, 0.3, sides),
+        extrapolate(place, motion, 0.3, sides),
         strict=True,
     ):
         np.testing.assert_allclose(got, expected, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Card of a player: its results in the challenge, as JSON, Markdown and a picture."""
+"""Report of a challenge: a player's results, as JSON, Markdown and a picture."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Card:
-    """Card of a player: all results of the protocol."""
+class ChallengeReport:
+    """Results of a player in all of the protocol."""
 
     name: str
     version: str
@@ -87,7 +87,7 @@ class Card:
         return json.dumps(data, indent=1)
 
     @staticmethod
-    def from_json(text: str) -> Card:
+    def from_json(text: str) -> ChallengeReport:
         """Read what `to_json` wrote.
 
         Raises:
@@ -97,7 +97,7 @@ class Card:
             data = json.loads(text)
             data.pop("totals")
             data["results"] = tuple(Result(**row) for row in data["results"])
-            card = Card(**data)
+            card = ChallengeReport(**data)
         except (KeyError, TypeError, json.JSONDecodeError) as error:
             raise ValueError(f"this is no card of a challenge: {error}") from error
         if card.protocol != PROTOCOL:
@@ -155,7 +155,7 @@ def _share(result: Result) -> str:
     return f"{result.score:.3f} ({result.low:.2f}..{result.high:.2f})"
 
 
-def plot_card(card: Card, path: Path) -> None:
+def plot_card(card: ChallengeReport, path: Path) -> None:
     """Draw the success in each task, a line for each profile, as a radar plot."""
     import matplotlib.pyplot as plt
 

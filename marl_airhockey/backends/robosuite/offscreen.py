@@ -20,7 +20,7 @@ THIN = 0.004
 """Half the width of a line, and half the height of a circle (m)."""
 
 
-class Camera:
+class OffscreenRenderer:
     """Camera on one model, for pictures of one size.
 
     Args:
@@ -91,7 +91,7 @@ class Camera:
         self._renderer.close()
 
 
-def _close(camera: weakref.ref[Camera]) -> None:
+def _close(camera: weakref.ref[OffscreenRenderer]) -> None:
     found = camera()
     if found is not None:
         found.close()

@@ -1,4 +1,4 @@
-"""Reckoning: where pucks are after a short free flight, walls included."""
+"""Extrapolation: where pucks are after a short free flight, walls included."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ LEGS = 4
 class Walls:
     """Walls of a table for the centres of its pucks, goals closed.
 
-    They return pucks as a wall does at 1 m/s to one without spin, with the middle
-    parameters of the scene.
+    Pucks bounce as one without spin does at 1 m/s, with the middle parameters of the
+    scene.
     """
 
     normals: Array
@@ -33,33 +33,34 @@ class Walls:
     @staticmethod
     def of(scene: Scene) -> Walls:
         """Return the walls of a scene, table frame."""
-        laws = {k: PARAMETERS[k].default for k in ("wall_restitution", "wall_friction")}
-        laws = {k: scene.defaults.get(k, laws[k]) for k in laws}
+        names = "wall_restitution", "wall_friction"
+        usual = {name: PARAMETERS[name].default for name in names}
+        wall = [scene.defaults.get(name, usual[name]) for name in names]
         table = scene.table
-        return Walls(table.normals, table.offsets - table.puck_radius, *laws.values())
+        return Walls(table.normals, table.offsets - table.puck_radius, *wall)
 
     def rotated(self, rotation: Array) -> Walls:
-        """Return the walls in a frame that is turned about the origin."""
+        """Return the walls in a frame that is rotated about the origin."""
         normals = self.normals @ rotation.T
         return Walls(normals, self.offsets, self.restitution, self.friction)
 
 
-def reckon(
-    place: Array, motion: Array, time: float, walls: Walls
+def extrapolate(
+    position: Array, velocity: Array, time: float, walls: Walls
 ) -> tuple[Array, Array]:
-    """Move pucks on by a time, past everything but walls, without air drag and spin.
+    """Predict pucks after a time, with walls, without paddles, air drag and spin.
 
     Args:
-        place: (..., 2) m.
-        motion: (..., 2) m/s.
+        position: (..., 2) m.
+        velocity: (..., 2) m/s.
         time: s.
         walls: in the frame of the pucks.
 
     Returns:
-        Places and velocities (..., 2), m and m/s.
+        Positions and velocities (..., 2), m and m/s.
     """
-    x, y = place[..., 0], place[..., 1]
-    vx, vy = motion[..., 0], motion[..., 1]
+    x, y = position[..., 0], position[..., 1]
+    vx, vy = velocity[..., 0], velocity[..., 1]
     left = time + 0.0 * x
     for _ in range(LEGS):
         due, nx, ny = left, 0.0 * x, 0.0 * x
@@ -79,49 +80,49 @@ def reckon(
     return np.stack([x, y], -1), np.stack([vx, vy], -1)
 
 
-def reckon_rows(
-    place: Array, motion: Array, time: float, walls: Walls
+def extrapolate_rows(
+    position: Array, velocity: Array, time: float, walls: Walls
 ) -> tuple[Array, Array]:
-    """Do what `reckon` does, for arrays (W, pucks, 2) of float64, in compiled code.
+    """Do what `extrapolate` does in compiled code, for (W, pucks, 2) of float64.
 
     Scripted players predict at every step: numpy's calls for so few rows would be most
     of the cost of a league.
     """
-    place_after, motion_after = np.empty(place.shape), np.empty(motion.shape)
-    _reckon_rows(
-        place,
-        motion,
+    position_after, velocity_after = np.empty(position.shape), np.empty(velocity.shape)
+    _extrapolate_rows(
+        position,
+        velocity,
         time,
         walls.normals,
         walls.offsets,
         walls.restitution,
         walls.friction,
-        place_after,
-        motion_after,
+        position_after,
+        velocity_after,
     )
-    return place_after, motion_after
+    return position_after, velocity_after
 
 
 @compiled(error_model="numpy")
-def _reckon_rows(
-    place: Array,
-    motion: Array,
+def _extrapolate_rows(
+    position: Array,
+    velocity: Array,
     time: float,
     normals: Array,
     offsets: Array,
     restitution: float,
     friction: float,
-    place_after: Array,
-    motion_after: Array,
+    position_after: Array,
+    velocity_after: Array,
 ) -> None:
-    """Fill positions and velocities (W, pucks, 2) after a flight, see `reckon`."""
-    for w in range(place.shape[0]):
-        for p in range(place.shape[1]):
+    """Fill positions and velocities (W, pucks, 2) after a flight, see `extrapolate`."""
+    for w in range(position.shape[0]):
+        for p in range(position.shape[1]):
             x, y, vx, vy = (
-                place[w, p, 0],
-                place[w, p, 1],
-                motion[w, p, 0],
-                motion[w, p, 1],
+                position[w, p, 0],
+                position[w, p, 1],
+                velocity[w, p, 0],
+                velocity[w, p, 1],
             )
             left = time
             for _ in range(LEGS):
@@ -138,5 +139,5 @@ def _reckon_rows(
                 grip = friction * push
                 drag = min(max(-slip / 3.0, -grip), grip)
                 vx, vy = vx + push * nx - drag * ny, vy + push * ny + drag * nx
-            place_after[w, p, 0], place_after[w, p, 1] = x, y
-            motion_after[w, p, 0], motion_after[w, p, 1] = vx, vy
+            position_after[w, p, 0], position_after[w, p, 1] = x, y
+            velocity_after[w, p, 0], velocity_after[w, p, 1] = vx, vy
