@@ -81,16 +81,16 @@ class HitGoal(GoalScenario):
         drop: -1 when the puck passes the home line.
         """
         return {
-            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "approach": rewards.approach(t),
             "aim": 2.0
             * rewards.gained(t.memory["near"], t.new_memory["near"])[..., None],
             "success": 3.0
             * (t.new_memory["entered"] & ~t.memory["entered"])[..., None],
-            "drop": -1.0 * t.after.crossed[..., 0, :1],
+            "drop": -1.0 * rewards.lost(t)[..., None],
         }
 
     def terminated(self, t: Transition) -> Array:
-        return t.new_memory["entered"] | t.after.crossed[..., 0, 0]
+        return t.new_memory["entered"] | rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
         """(...) bool: a touched, rising puck has been inside the circle."""

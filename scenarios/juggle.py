@@ -80,7 +80,7 @@ class Juggle(Scenario):
         }
 
     def terminated(self, t: Transition) -> Array:
-        return np.asarray(t.after.crossed[..., 0].any(-1))
+        return rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
         """(...) bool: the puck has been hit up ``hits`` times."""

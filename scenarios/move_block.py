@@ -106,16 +106,16 @@ class MoveBlock(Scenario):
         drop: -1 when the puck passes the home line.
         """
         return {
-            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "approach": rewards.approach(t),
             "aim": 2.0
             * rewards.gained(t.memory["near"], t.new_memory["near"])[..., None],
             "moved": 10.0 * (t.new_memory["moved"] - t.memory["moved"])[..., None],
             "success": 3.0 * self.success(t)[..., None],
-            "drop": -1.0 * t.after.crossed[..., 0, :1],
+            "drop": -1.0 * rewards.lost(t)[..., None],
         }
 
     def terminated(self, t: Transition) -> Array:
-        return self.success(t) | t.after.crossed[..., 0, 0]
+        return self.success(t) | rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
         """(...) bool: the block has moved by ``way`` since the first touch."""

@@ -69,14 +69,14 @@ class PuckVelocity(Scenario):
         drop: -1 when the puck passes the home line.
         """
         return {
-            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "approach": rewards.approach(t),
             "rise": (t.new_memory["rise"] - t.memory["rise"])[..., None],
             "success": 2.0 * self.success(t)[..., None],
-            "drop": -1.0 * t.after.crossed[..., 0, :1],
+            "drop": -1.0 * rewards.lost(t)[..., None],
         }
 
     def terminated(self, t: Transition) -> Array:
-        return self.success(t) | t.after.crossed[..., 0, 0]
+        return self.success(t) | rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
         """(...) bool: the puck has risen at ``fast`` after a touch."""

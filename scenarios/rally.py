@@ -15,6 +15,7 @@ from marl_airhockey.toolkit import (
     Scene,
     State,
     Transition,
+    length,
     observables,
     rewards,
     starts,
@@ -109,7 +110,7 @@ class Rally(Scenario):
         return {"crossing": counted[..., None] * np.ones(2)}
 
     def terminated(self, t: Transition) -> Array:
-        slow = rewards.length(t.after.puck_velocity[..., 0, :]) < rewards.SLOW
+        slow = length(t.after.puck_velocity[..., 0, :]) < rewards.SLOW
         return np.asarray(slow | (t.new_memory["idle"] >= self.patience - 1e-9))
 
     def caption(self, memory: Memory) -> str:

@@ -82,7 +82,7 @@ class Strike(Scenario):
         success: 2 once.
         """
         return {
-            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "approach": rewards.approach(t),
             "speed": (t.new_memory["speed"] - t.memory["speed"])[..., None],
             "time": np.full((*t.after.time.shape, 1), -0.01),
             "success": 2.0 * (t.new_memory["struck"] & ~t.memory["struck"])[..., None],

@@ -109,7 +109,7 @@ class StrikeCrowd(Scenario):
         success: 3 once.
         """
         return {
-            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "approach": rewards.approach(t),
             "rise": 0.5 * (t.new_memory["rise"] - t.memory["rise"])[..., None],
             "spread": 4.0 * (t.new_memory["spread"] - t.memory["spread"])[..., None],
             "time": np.full((*t.after.time.shape, 1), -0.01),

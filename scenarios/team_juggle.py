@@ -111,7 +111,7 @@ class TeamJuggle(Scenario):
         return terms
 
     def terminated(self, t: Transition) -> Array:
-        return np.asarray(t.after.crossed[..., 0].any(-1))
+        return rewards.lost(t)
 
     def caption(self, memory: Memory) -> str:
         return f"passes {memory['passes']:.0f}"

@@ -60,13 +60,13 @@ class Touch(Scenario):
         drop: -1 when the puck passes the home line.
         """
         return {
-            "approach": (t.memory["gap"] - t.new_memory["gap"])[..., None],
+            "approach": rewards.approach(t),
             "touch": 1.0 * (t.new_memory["touches"] - t.memory["touches"]).sum(-1),
-            "drop": -1.0 * t.after.crossed[..., 0, :1],
+            "drop": -1.0 * rewards.lost(t)[..., None],
         }
 
     def terminated(self, t: Transition) -> Array:
-        return t.after.crossed[..., 0, 0]
+        return rewards.lost(t)
 
     def success(self, t: Transition) -> Array:
         """(...) bool: any distinct touch."""

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from starlette.applications import Starlette
 
     from marl_airhockey.play.live_match import LiveMatch
+    from marl_airhockey.play.open_table import Plant
     from marl_airhockey.play.server import AccessCheck
-    from marl_airhockey.play.session import Plant
 
 Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
 Port = Annotated[int, typer.Option(help="0 for a free one.", min=0, max=65535)]
@@ -139,16 +139,18 @@ def host_match(
         browser: see `host_table`.
         film: whether to keep a real table's pictures beside the recordings.
     """
+    from marl_airhockey.play.open_table import open_table
     from marl_airhockey.play.real_match import RealMatch
     from marl_airhockey.play.recorder import Recorder
     from marl_airhockey.play.server import application
-    from marl_airhockey.play.session import Session
 
     filmed = match.backend.camera if film and isinstance(match, RealMatch) else None
-    session = Session(match, Recorder(record, filmed) if record else None)
+    recorder = Recorder(record, filmed) if record else None
     with contextlib.ExitStack() as stack:
+        plant = None
         if isinstance(match, RealMatch):
-            session.plant = stack.enter_context(lab_plant(match.backend.rig.operator))
+            plant = stack.enter_context(lab_plant(match.backend.rig.operator))
+        session = open_table(match, recorder, plant)
         name = match.world.scenario.name
         host_table(
             lambda access: application(session, access), name, host, port, browser
@@ -166,7 +168,7 @@ def lab_plant(operator: str) -> Iterator[Plant]:
     """
     from marl_airhockey.lab.faults import FAULTS
     from marl_airhockey.lab.lab import LabClient
-    from marl_airhockey.play.session import Plant
+    from marl_airhockey.play.open_table import Plant
 
     kind, _, port = operator.partition(":")
     if kind != "lab":

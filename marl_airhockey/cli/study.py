@@ -71,12 +71,12 @@ def run(
     from marl_airhockey.play.server import application
     from marl_airhockey.study.archive import claim_folder
     from marl_airhockey.study.plan_file import load_plan
-    from marl_airhockey.study.study import Study
+    from marl_airhockey.study.study import open_study
 
     plan = load_plan(file)
     claim_folder(out, file)
     with waiting("preparing the table (longer when it is the first time)"):
-        session = Study(plan, out)
+        session = open_study(plan, out)
     host_table(
         lambda access: application(session, access), plan.title, host, port, browser
     )

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
 
 import numpy as np
 
 from marl_airhockey.core.geometry import clip, half_planes
 from marl_airhockey.core.table import Table
 from marl_airhockey.types import Array
-
-SeatKind = Literal["robot", "arcade"]
-
 
 SEAT_KINDS: tuple[str, ...] = ("robot", "arcade")
 

@@ -59,6 +59,11 @@ class SlotEnv:
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
 
+    @property
+    def unwrapped(self) -> SlotEnv:
+        """The environment itself, as gymnasium's environments have it."""
+        return self
+
     def seed(self, seed: int) -> None:
         """Give world i the seed + i at the next reset."""
         self.world.seed(seed)

@@ -114,8 +114,8 @@ def application(session: Session, access: AccessCheck) -> Starlette:
         loop.add_done_callback(lambda task: _note_failure(session, task))
         yield
         loop.cancel()
-        if session.recorder is not None:
-            session.recorder.end(session.match, "the server was stopped")
+        if session.host.recorder is not None:
+            session.host.recorder.end(session.match, "the server was stopped")
         session.match.close()
 
     async def connection(socket: WebSocket) -> None:

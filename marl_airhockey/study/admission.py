@@ -6,12 +6,13 @@ import time
 from pathlib import Path
 
 from marl_airhockey.play.client import Client
+from marl_airhockey.play.host import GONE, GRACE
 from marl_airhockey.play.match_drivers import PERSON
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.play.session import GONE, GRACE, IDLE, Session
+from marl_airhockey.play.seats import Seats
 from marl_airhockey.study.archive import Diary, diaries, erase, page_digest
 from marl_airhockey.study.course import Course
-from marl_airhockey.study.opponents import open_match, seat_opponent
+from marl_airhockey.study.opponents import seat_opponent
 from marl_airhockey.study.people import Participant, Person
 from marl_airhockey.study.plan import Plan
 
@@ -20,20 +21,20 @@ ABSENT = 600.0
 PARTICIPANT_SEAT, PARTNER_SEAT = 0, 1
 
 
-class AdmissionSession(Session):
-    """Session in which people get a seat after their consent.
+class Admission:
+    """People of a study and their seats, which they get after their consent.
 
     Args:
-        plan: of the study.
-        folder: where it is kept.
-
-    Raises:
-        ValueError: an opponent that cannot play the plan's scenario.
+        plan: Plan of the study.
+        folder: Folder of the study.
+        seats: Seats of the match.
     """
 
-    def __init__(self, plan: Plan, folder: Path) -> None:
-        super().__init__(open_match(plan))
+    def __init__(self, plan: Plan, folder: Path, seats: Seats) -> None:
         self.plan, self.folder = plan, folder
+        self._seats, self._match = seats, seats.match
+        self.recorder: Recorder | None = None
+        """Recorder of the participant's games; None without a participant."""
         self.participant: Participant | None = None
         self.partner: Person | None = None
         """Person who plays as the participant's opponent."""
@@ -42,40 +43,46 @@ class AdmissionSession(Session):
         self._seated_for: tuple[Course, int] | None = None
         """Course and block whose opponent is seated; None for nobody's."""
 
-    def _on_hello(self, client: Client, key: str) -> None:
+    def hello(self, client: Client, key: str) -> None:
+        """Let a page in, and a person resume whose session was cut off."""
         client.key = key
         if self.participant is None and key not in self._erased:
             self._resume(key)
-        self._seat_people()
-        if self.match.reason == GONE and not self.free_seats:
-            self.match.start()
+        self.seat_people()
+        if self._match.reason == GONE and not self._seats.free:
+            self._match.start()
 
-    def _person(self, client: Client) -> Person | None:
+    def person(self, client: Client) -> Person | None:
         """Return the person at a page; None for somebody who has not agreed."""
         for person in (self.participant, self.partner):
             if person is not None and person.key == client.key:
                 return person
         return None
 
-    def _seat_people(self) -> None:
+    def seat_people(self) -> None:
         """Give everybody the seat of their role; of two pages of a person the first."""
         seats: dict[int, Client] = {}
-        for client in sorted(self.clients, key=lambda c: c.seat is None):
-            person = self._person(client)
+        for client in sorted(self._seats.clients, key=lambda c: c.seat is None):
+            person = self.person(client)
             seat = PARTICIPANT_SEAT if person is self.participant else PARTNER_SEAT
-            for_people = self.match.drivers.names[seat] == PERSON
+            for_people = self._match.drivers.names[seat] == PERSON
             if person is None or not for_people or seat in seats:
                 client.seat = None
                 continue
             seats[seat] = client
             client.name, client.consent = person.diary.code, self.plan.version
             if client.seat is None:
-                self._take(client, seat)
+                self._seats.take(client, seat)
 
-    def _on_consent(self, client: Client, version: str) -> None:
+    def consent(self, client: Client, version: str) -> None:
+        """Admit the person at a page, who has agreed to the texts of a version.
+
+        Raises:
+            ValueError: The texts have changed since.
+        """
         if version != self.plan.version:
             raise ValueError("these texts have changed: load the page again")
-        if self._stage(client) != "consent" or not client.key:
+        if self.stage(client) != "consent" or not client.key:
             return
         role = "participant" if self.participant is None else "partner"
         diary = Diary.begin(self.folder, role, self.plan, client.key)
@@ -85,16 +92,16 @@ class AdmissionSession(Session):
             self._admit(client.key, diary)
         else:
             self.partner = Person(client.key, diary, now)
-        self._seat_people()
+        self.seat_people()
 
     def _admit(self, key: str, diary: Diary) -> None:
         """Begin with a participant, or resume where the diary ends."""
         course = Course(self.plan, diary)
         self.participant = Participant(key, diary, time.monotonic(), course)
         self.recorder = Recorder(diary.folder)
-        self._prepare()
+        self.prepare()
 
-    def _prepare(self) -> None:
+    def prepare(self) -> None:
         """Seat the opponent of the participant's block."""
         course = self.participant.course if self.participant else None
         wanted = (course, course.block) if course else None
@@ -102,8 +109,8 @@ class AdmissionSession(Session):
             return
         self._seated_for = wanted
         if course and course.opponent:
-            seat_opponent(self.match, course.opponent)
-        self._seat_people()
+            seat_opponent(self._match, course.opponent)
+        self.seat_people()
 
     def _resume(self, key: str) -> None:
         """Resume a session that was cut off, from its diary."""
@@ -118,31 +125,25 @@ class AdmissionSession(Session):
                 self._admit(key, diary)
                 return
 
-    def receive(self, client: Client, text: str) -> None:
-        """Handle a message; between games, first look for people who were erased."""
-        if self.match.phase not in ("play", "countdown"):
-            self._dismiss_erased()
-        super().receive(client, text)
-
-    def _dismiss_erased(self) -> None:
+    def dismiss_erased(self) -> None:
         """Dismiss people whose folder somebody has deleted."""
         for person in (self.participant, self.partner):
             if person is not None and not person.diary.exists:
                 self._dismiss(person)
                 self._erased.add(person.key)
 
-    def _on_withdraw(self, client: Client) -> None:
-        """Erase all that is kept of a person, at once."""
-        person = self._person(client)
+    def withdraw(self, client: Client) -> None:
+        """Erase all that is kept of the person at a page, immediately."""
+        person = self.person(client)
         if person is None:
             return
         self._dismiss(person)
         erase(self.folder, person.diary.code)
         self._erased.add(client.key)
 
-    def _on_next(self, client: Client) -> None:
+    def next_person(self, client: Client) -> None:
         """Dismiss a participant who has come to the end."""
-        person = self._person(client)
+        person = self.person(client)
         if isinstance(person, Participant) and person.at_end:
             self._dismiss(person)
         self._erased.discard(client.key)
@@ -150,25 +151,25 @@ class AdmissionSession(Session):
     def _dismiss(self, person: Person) -> None:
         """End a person's part; a game that runs is broken off."""
         is_participant = person is self.participant
-        if is_participant or self.match.drivers.names[PARTNER_SEAT] == PERSON:
-            self.match.abort("a player has left")
+        if is_participant or self._match.drivers.names[PARTNER_SEAT] == PERSON:
+            self._match.abort("a player has left")
             if self.recorder is not None:
-                self.recorder.end(self.match, "a player has left")
+                self.recorder.end(self._match, "a player has left")
         if is_participant:
             self.participant = self.recorder = None
         else:
             self.partner = None
-        self._seat_people()
+        self.seat_people()
 
-    def _check_presence(self, now: float) -> None:
+    def check_presence(self, now: float) -> None:
         """Pause for people who are idle; dismiss those who stay away."""
-        for client in self.clients:
-            person = self._person(client)
+        for client in self._seats.clients:
+            person = self.person(client)
             if person is not None:
                 person.last_seen = now
-            if client.seat is not None and now - client.last_input > IDLE:
-                self.match.pause("a player has been idle")
-        self._dismiss_erased()
+            if self._seats.is_idle(client, now):
+                self._match.pause("a player has been idle")
+        self.dismiss_erased()
         for person in (self.participant, self.partner):
             if person is None:
                 continue
@@ -178,11 +179,11 @@ class AdmissionSession(Session):
                     person.diary.write("end", reason="left")
                 self._dismiss(person)
 
-    def _stage(self, client: Client) -> str:
+    def stage(self, client: Client) -> str:
         """Return the stage of a course, or: consent, partner, busy, erased."""
         if client.key in self._erased:
             return "erased"
-        person = self._person(client)
+        person = self.person(client)
         if isinstance(person, Participant):
             return person.course.stage if client.seat is not None else "busy"
         if person is not None:

@@ -2,37 +2,63 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from marl_airhockey.play.client import Client
+from marl_airhockey.play.host import Handler, Host
 from marl_airhockey.play.live_match import RATE
-from marl_airhockey.study.admission import PARTICIPANT_SEAT, AdmissionSession
+from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.seats import Seats
+from marl_airhockey.play.session import Session
+from marl_airhockey.study.admission import PARTICIPANT_SEAT, Admission
 from marl_airhockey.study.course import BROKEN_OFF, Course
-from marl_airhockey.study.opponents import seat_opponent
+from marl_airhockey.study.opponents import open_match, seat_opponent
 from marl_airhockey.study.pages import progress, seat_rows, texts
 from marl_airhockey.study.people import Participant
 from marl_airhockey.study.plan import Plan
 
 
-class Study(AdmissionSession):
-    """Session in which one participant after the other goes through a plan.
+def open_study(plan: Plan, folder: Path) -> Session:
+    """Return a session in which one participant after the other follows a plan.
 
     Args:
-        plan: of the study.
-        folder: where it is kept.
+        plan: Plan of the study.
+        folder: Folder of the study.
 
     Raises:
-        ValueError: an opponent that cannot play the plan's scenario.
+        ValueError: An opponent that cannot play the plan's scenario.
+    """
+    return Session(Study(plan, folder, Seats(open_match(plan))))
+
+
+class Study(Host):
+    """Host that takes one participant after the other through a plan.
+
+    Args:
+        plan: Plan of the study.
+        folder: Folder of the study.
+        seats: Seats of the match.
+
+    Raises:
+        ValueError: An opponent that cannot play the plan's scenario.
     """
 
-    ACCEPTED = {"hello", "aim", "stick", "start", "pause", "consent", "answer"} | {
-        "withdraw",
-        "next",
-    }
-
-    def __init__(self, plan: Plan, folder: Path) -> None:
-        super().__init__(plan, folder)
+    def __init__(self, plan: Plan, folder: Path, seats: Seats) -> None:
+        super().__init__(seats)
+        self.plan, self.people = plan, Admission(plan, folder, seats)
+        self._handlers: dict[str, Handler] = {
+            "hello": self.people.hello,
+            "aim": seats.aim,
+            "stick": seats.stick,
+            "start": self._start,
+            "pause": self._pause,
+            "consent": self.people.consent,
+            "answer": self._answer,
+            "withdraw": self.people.withdraw,
+            "next": self.people.next_person,
+        }
         # Everything is played once, so that nothing is compiled in a session.
         opponents = list(plan.opponents)
         if opponents and plan.practice:
@@ -43,9 +69,30 @@ class Study(AdmissionSession):
         if not opponents:
             self.match.warm_up()
 
-    def _on_start(self, client: Client) -> None:
-        participant = self.participant
-        if participant is None or client.seat is None or self.free_seats:
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        return self._handlers
+
+    @property
+    def recorder(self) -> Recorder | None:
+        return self.people.recorder
+
+    def before_message(self) -> None:
+        """Between games, look for people who were erased."""
+        if self.match.phase not in ("play", "countdown"):
+            self.people.dismiss_erased()
+
+    def check_presence(self, now: float) -> None:
+        """Pause for people who are idle; dismiss those who stay away."""
+        self.people.check_presence(now)
+
+    def _pause(self, client: Client) -> None:
+        if self.seats.may_control(client):
+            self.match.pause()
+
+    def _start(self, client: Client) -> None:
+        participant = self.people.participant
+        if participant is None or client.seat is None or self.seats.free:
             return
         course = participant.course
         if course.stage == "match":
@@ -58,20 +105,19 @@ class Study(AdmissionSession):
             self.recorder.notes = notes
             self.match.start()
 
-    def tick(self) -> None:
-        """Advance the match and the participant's course by a tick."""
-        super().tick()
+    def after_tick(self) -> None:
+        """Advance the participant's course by a tick."""
         over = self.match.phase == "done"
         if over:
-            self._dismiss_erased()
-        if self.participant is None:
+            self.people.dismiss_erased()
+        if self.people.participant is None:
             return
-        course = self.participant.course
+        course = self.people.participant.course
         if course.stage == "match" and over:
             self._end_game(course)
         else:
             course.advance(1 / RATE)
-        self._prepare()
+        self.people.prepare()
 
     def _end_game(self, course: Course) -> None:
         """Note the game that is over."""
@@ -96,11 +142,11 @@ class Study(AdmissionSession):
         contest = len({seat.team for seat in match.seats}) > 1
         return "drawn" if contest and not match.winners else "lost"
 
-    def _on_answer(self, client: Client, question: str, value: int) -> None:
-        person = self._person(client)
+    def _answer(self, client: Client, question: str, value: int) -> None:
+        person = self.people.person(client)
         if isinstance(person, Participant):
             person.course.answer(question, value)
-            self._prepare()
+            self.people.prepare()
 
     def describe(self) -> dict[str, Any]:
         """Return what a page gets once: the match and the texts of the study; JSON."""
@@ -111,17 +157,18 @@ class Study(AdmissionSession):
             "study": texts(self.plan),
         }
 
-    def _status(self) -> dict[str, Any]:
-        """Return what all pages get; of opponents only what the plan allows."""
-        course = self.participant.course if self.participant else None
+    def status(self) -> dict[str, Any]:
+        """Return what all pages get of opponents: only what the plan allows."""
+        participant = self.people.participant
+        course = participant.course if participant else None
         seats = seat_rows(course, len(self.match.seats))
-        return {**super()._status(), "seats": seats, "handicap": ""}
+        return {"seats": seats, "handicap": ""}
 
-    def _own_fields(self, client: Client) -> dict[str, Any]:
-        stage: dict[str, Any] = {"stage": self._stage(client)}
-        person = self._person(client)
+    def own_fields(self, client: Client) -> dict[str, Any]:
+        stage: dict[str, Any] = {"stage": self.people.stage(client)}
+        person = self.people.person(client)
         if person is not None:
             stage["code"] = person.diary.code
         if isinstance(person, Participant):
-            stage |= progress(person.course, bool(self.free_seats))
-        return {**super()._own_fields(client), "study": stage}
+            stage |= progress(person.course, bool(self.seats.free))
+        return {"study": stage}

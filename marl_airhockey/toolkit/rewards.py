@@ -1,6 +1,7 @@
-"""Rewards: measures of a transition, with those of touches, lifts, possession, saves.
+"""Rewards: measures of a transition that the rules of several scenarios use.
 
-All functions are pure and vectorised over the caller's leading axes.
+Distances and paths of pucks, lifts (pucks that are hit and rise), possession and saves.
+All functions are pure and vectorized over the caller's leading axes.
 """
 
 from __future__ import annotations
@@ -8,20 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Transition
-from marl_airhockey.core.geometry import length as length
-from marl_airhockey.core.touches import count_touches as count_touches
-from marl_airhockey.core.touches import no_touches as no_touches
+from marl_airhockey.core.geometry import length
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import reaches
+from marl_airhockey.core.state import State
 from marl_airhockey.core.touches import touched as touched
-from marl_airhockey.toolkit.lifts import contact_height as contact_height
-from marl_airhockey.toolkit.lifts import lifts as lifts
-from marl_airhockey.toolkit.lifts import no_lifts as no_lifts
-from marl_airhockey.toolkit.possession import SLOW as SLOW
-from marl_airhockey.toolkit.possession import held as held
-from marl_airhockey.toolkit.possession import in_reach as in_reach
-from marl_airhockey.toolkit.possession import last_toucher as last_toucher
-from marl_airhockey.toolkit.possession import lying as lying
-from marl_airhockey.toolkit.saves import saves as saves
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
+
+SLOW = 0.05
+"""Speed below which a puck is at rest (m/s)."""
+SHOT = 1.0
+"""Speed from which a puck on its way into a goal is a shot (m/s)."""
 
 
 def tolerance(value: Array, bound: float, margin: float) -> Array:
@@ -48,6 +46,19 @@ def nearest(t: Transition) -> Array:
         t.memory["gap"],
     )
     return np.where(touched(t.new_memory), old, np.minimum(old, gap))
+
+
+def approach(t: Transition) -> Array:
+    """(..., 1) distance by which paddle 0 came nearer to puck 0 than before, m.
+
+    It is that of ``gap`` in the memory, see `nearest`.
+    """
+    return np.asarray((t.memory["gap"] - t.new_memory["gap"])[..., None])
+
+
+def lost(t: Transition) -> Array:
+    """(...) bool: a puck crossed the first goal line, home."""
+    return np.asarray(t.after.crossed[..., 0].any(-1))
 
 
 def gained(old: Array, new: Array) -> Array:
@@ -123,3 +134,127 @@ def enters(
         inside &= alike(puck[..., 2:], wanted, angle, speed_share, speed_slack)
     entered: Array = np.logical_or.reduce(inside, axis=-1)
     return entered, gap, error
+
+
+def contact_height(t: Transition) -> Array:
+    """(..., pucks) x of each puck at its last contact with a paddle in this step, m.
+
+    During a contact it is the present x, else the x in free flight at the time when the
+    contact began; nan without a contact.
+    """
+    at = np.where(t.after.touched > 0, t.after.touched_at, np.nan)
+    last = np.fmax.reduce(at, axis=-2)
+    hit = t.before.puck[..., 0] + t.before.puck_velocity[..., 0] * last
+    return np.where(t.after.touching.any(-2), t.after.puck[..., 0], hit)
+
+
+def no_lifts(state: State) -> Memory:
+    """Return the memory of `lifts` at the start of an episode, arrays (W, pucks)."""
+    pucks = state.visible.shape
+    return {"armed": np.zeros(pucks), "struck_at": np.full(pucks, -0.5)}
+
+
+def lifts(t: Transition, lift: float) -> tuple[Memory, Array]:
+    """Follow pucks from a hit until they have risen by ``lift`` above it, m.
+
+    Returns:
+        New memory: ``armed``, 1 from the hit until then, and ``struck_at``, its x (m);
+        and True for pucks that have risen so far in this step. All (..., pucks).
+    """
+    height = contact_height(t)
+    struck = ~np.isnan(height)
+    struck_at = np.where(struck, height, t.memory["struck_at"])
+    armed = np.where(struck, 1.0, t.memory["armed"])
+    risen = (armed > 0) & (t.after.puck[..., 0] >= struck_at + lift)
+    return {"armed": np.where(risen, 0.0, armed), "struck_at": struck_at}, risen
+
+
+def last_toucher(who: Array, after: State) -> Array:
+    """(..., pucks) number of the seat that touched each puck last; ``who`` if none did.
+
+    Seats are numbered from 1; 0 means none.
+    """
+    at = np.where(after.touched > 0, after.touched_at, -1.0)
+    at = np.where(after.touching, np.inf, at)
+    latest = np.zeros_like(after.puck[..., 0])
+    for seat in range(after.bodies.paddles):
+        later = at[..., seat, :] > latest
+        who = np.where(later, 1.0 + seat, who)
+        latest = np.where(later, at[..., seat, :], latest)
+    return who
+
+
+def held(scene: Scene, t: Transition) -> Array:
+    """(..., seats, pucks) time a puck has been in reach of a seat or its mates, s.
+
+    It continues ``held`` of the memory.
+    """
+    dt = (t.after.time - t.before.time)[..., None, None]
+    has = in_reach(scene, t.after.puck)
+    teams = np.array([seat.team for seat in scene.seats])
+    rows = [has[..., teams == seat.team].any(-1) for seat in scene.seats]
+    ours = np.stack(rows, axis=-2)
+    return np.where(ours, t.memory["held"] + dt, 0.0)
+
+
+def lying(t: Transition, clocks: Array) -> Array:
+    """(..., pucks) time a puck has been slower than 0.05 m/s out of every reach, s.
+
+    It continues ``lying`` of the memory.
+
+    Args:
+        t: transition.
+        clocks: result of `held` for it.
+    """
+    dt = (t.after.time - t.before.time)[..., None]
+    lies = (length(t.after.puck_velocity) < SLOW) & ~(clocks > 0.0).any(-2)
+    return np.where(lies, t.memory["lying"] + dt, 0.0)
+
+
+def in_reach(scene: Scene, point: Array) -> Array:
+    """(..., seats) bool: each seat's paddle can touch a puck at a point (..., 2)."""
+    normals, offsets = reaches(scene.table, scene.seats)
+    touch = scene.table.paddle_radius + scene.table.puck_radius
+    ahead = (normals * point[..., None, None, :]).sum(-1) + offsets
+    inside: Array = np.logical_and.reduce(ahead >= -touch, axis=-1)
+    return inside
+
+
+def on_goal(scene: Scene, state: State, seat: int) -> Array:
+    """(..., pucks) bool: the puck flies straight into the goal of a seat's side."""
+    side = scene.seats[seat].side
+    width = next(g.width for g in scene.goal_lines if g.side == side)
+    if width is None:
+        raise ValueError(f"seat {seat}: its side has no goal of some width")
+    normal, offset = scene.table.normals[side], scene.table.offsets[side]
+    along = np.array([-normal[1], normal[0]])
+    middle = sum(scene.table.ends(side)) @ along / 2.0
+    place, motion = state.puck, state.puck_velocity
+    nearing = -(motion * normal).sum(-1)
+    due = ((place * normal).sum(-1) + offset) / np.maximum(nearing, 1e-6)
+    aside = (place * along).sum(-1) + due * (motion * along).sum(-1) - middle
+    there = (nearing > 0.0) & (np.abs(aside) < width / 2.0)
+    return np.asarray(there & (length(motion) >= SHOT))
+
+
+def saves(scene: Scene, t: Transition, toucher: Array) -> Array:
+    """(..., seats, seats) number of shots of each seat (last axis) that each stopped.
+
+    A seat stops a shot when its paddle touches a puck that flew straight into its goal
+    at the start of the step and that a seat of another team had touched last.
+
+    Args:
+        scene: scene of the scenario; its goal lines have widths.
+        t: transition.
+        toucher: (..., pucks) number of who touched each puck last before the step, from
+            1; 0 for nobody. See `last_toucher`.
+    """
+    rows = []
+    for i, keeper in enumerate(scene.seats):
+        stopped = (t.after.touched[..., i, :] > 0) & on_goal(scene, t.before, i)
+        shots = [
+            (stopped & (toucher == 1 + k) & (shooter.team != keeper.team)).sum(-1)
+            for k, shooter in enumerate(scene.seats)
+        ]
+        rows.append(np.stack(shots, axis=-1))
+    return 1.0 * np.stack(rows, axis=-2)

@@ -13,7 +13,7 @@ from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import GRAVITY, TABLES
 from marl_airhockey.jit.threads import use_threads
 from marl_airhockey.play.live_match import RATE, LiveMatch
-from marl_airhockey.play.session import Session
+from marl_airhockey.play.open_table import open_table
 from marl_airhockey.registry import find_backend
 
 mujoco = pytest.importorskip("mujoco")
@@ -364,7 +364,7 @@ def test_it_is_seen_from_three_viewpoints():
 
 def test_a_person_moves_an_arm():
     match = LiveMatch("juggle", {}, {"backend": "robosuite"}, seed=0)
-    session = Session(match)
+    session = open_table(match)
     client = session.connect()
     session.receive(client, line("hello", key="k"))
     session.receive(client, aim(-0.5, 0.15))

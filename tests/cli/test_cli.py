@@ -225,7 +225,7 @@ def test_an_exported_onnx_model_acts_as_the_run_and_knows_its_card(touch_run, tm
 
 
 def test_the_benchmark_of_engines_says_what_it_is_without_ray():
-    script = Path(__file__).parents[2] / "scripts/bench_engines.py"
+    script = Path(__file__).parents[2] / "scripts/bench/engines.py"
     done = subprocess.run(
         [sys.executable, script, "--help"], capture_output=True, text=True, check=True
     )

@@ -9,8 +9,8 @@ import pytest
 
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.handicap import Handicap
+from marl_airhockey.play.open_table import Plant, open_table
 from marl_airhockey.play.real_match import RealMatch
-from marl_airhockey.play.session import Plant, Session
 
 
 @pytest.fixture
@@ -76,8 +76,8 @@ def test_an_episode_begins_stops_and_goes_on_by_word(lab, match, fault):
 @pytest.mark.slow
 def test_who_is_elsewhere_watches_and_nobody_is_erratic(match):
     switched = []
-    session = Session(match)
-    session.plant = Plant(
+    session = open_table(match)
+    session.host.plant = Plant(
         {"dark_camera": "dark"}, lambda *order: switched.append(order)
     )
     away, here = session.connect(remote=True), session.connect()
@@ -99,7 +99,7 @@ def test_who_is_elsewhere_watches_and_nobody_is_erratic(match):
 
 def test_an_arm_moves_only_while_somebody_holds_on(match):
     match.set_driver(0, "person")
-    session = Session(match)
+    session = open_table(match)
     client = session.connect()
     session.receive(client, '{"t": "hello", "key": "a"}')
     mouse = match.drivers.input_device(0, "mouse")
@@ -108,9 +108,9 @@ def test_an_arm_moves_only_while_somebody_holds_on(match):
     assert mouse.target is None
     session.receive(client, aim % 1)
     assert mouse.target == (-0.6, 0.1)
-    session._check_hands(time.monotonic() + 0.2)
+    session.host.seats.rest_unheld(time.monotonic() + 0.2)
     assert mouse.target is not None, "news of it is on its way"
-    session._check_hands(time.monotonic() + 0.4)
+    session.host.seats.rest_unheld(time.monotonic() + 0.4)
     assert mouse.target is None, "no news is let go"
     session.receive(client, aim % 1)
     session.receive(client, aim % 0)

@@ -103,5 +103,5 @@ def test_a_killed_run_goes_on_where_it_stood(tmp_path):
 
 
 def test_the_tutorial_runs():
-    out = run("tutorial_rllib.py", "--iterations", "1", "--steps", "1000")
+    out = run("tutorials/with_rllib.py", "--iterations", "1", "--steps", "1000")
     assert "p0 as a driver scores" in out

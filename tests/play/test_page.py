@@ -6,8 +6,8 @@ from pages import page_at, running, served, state_of, wait
 from study_steps import plan_writer
 
 from marl_airhockey.play.live_match import RATE, LiveMatch
+from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.play.session import Session
 
 
 def test_a_person_plays_in_the_browser(browser):
@@ -72,11 +72,11 @@ def test_a_phone_plays_upright(browser):
 
 def test_a_recording_is_watched_in_the_page(browser, tmp_path):
     match = LiveMatch("duel", {"paddle_0": "striker", "paddle_1": "still"}, {}, seed=1)
-    session = Session(match, Recorder(tmp_path))
+    session = open_table(match, Recorder(tmp_path))
     match.start()
     for _ in range(8 * RATE):
         session.tick()
-    session.recorder.end(match, "enough")
+    session.host.recorder.end(match, "enough")
     (path,) = tmp_path.iterdir()
     complaints = []
     with running("watch", str(path)) as (address, _):

@@ -9,7 +9,8 @@ from pages import aim, line
 
 from marl_airhockey.play.handicap import PRESETS, Handicap
 from marl_airhockey.play.live_match import RATE, LiveMatch
-from marl_airhockey.play.session import IDLE, Session
+from marl_airhockey.play.open_table import open_table
+from marl_airhockey.play.seats import IDLE
 
 
 @pytest.mark.usefixtures("uncompiled")
@@ -27,7 +28,7 @@ def test_every_scenario_is_played_and_drawn(scenario):
 
 def test_a_pointer_moves_its_paddle_and_stays_within_the_limits():
     match = LiveMatch("duel", {"paddle_0": "still"}, {}, seed=1)
-    session = Session(match)
+    session = open_table(match)
     client = session.connect()
     session.receive(client, line("hello", key="k"))
     assert client.seat == 1
@@ -49,7 +50,7 @@ def test_a_pointer_moves_its_paddle_and_stays_within_the_limits():
 
 def test_a_stick_is_a_velocity():
     match = LiveMatch("duel", {"paddle_1": "still"}, {}, seed=1)
-    session = Session(match)
+    session = open_table(match)
     client = session.connect()
     session.receive(client, line("hello", key="k"))
     session.receive(client, line("start"))
@@ -70,7 +71,7 @@ def test_a_stick_is_a_velocity():
 
 def test_two_people_and_a_watcher():
     match = LiveMatch("duel", {}, {}, seed=1)
-    session = Session(match)
+    session = open_table(match)
     clients = [session.connect() for _ in range(3)]
     for i, client in enumerate(clients):
         session.receive(client, line("hello", key=str(i)))
@@ -109,18 +110,18 @@ def test_two_people_and_a_watcher():
 
 
 def test_an_idle_page_loses_its_seat():
-    session = Session(LiveMatch("duel", {}, {}, seed=1))
+    session = open_table(LiveMatch("duel", {}, {}, seed=1))
     client = session.connect()
     session.receive(client, line("hello", key="k"))
-    session._check_presence(time.monotonic() + IDLE / 2)
+    session.host.check_presence(time.monotonic() + IDLE / 2)
     assert client.seat == 0
-    session._check_presence(time.monotonic() + IDLE + 1)
+    session.host.check_presence(time.monotonic() + IDLE + 1)
     assert client.seat is None
 
 
 def test_opponents_are_chosen_between_matches_and_ends_change():
     match = LiveMatch("duel", {"paddle_1": "zoo/duel"}, {}, seed=1)
-    session = Session(match)
+    session = open_table(match)
     client = session.connect()
     session.receive(client, line("hello", key="k"))
     session.receive(client, line("opponent", seat=1, name="../secret.zip"))

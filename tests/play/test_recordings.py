@@ -11,19 +11,19 @@ from PIL import Image
 from marl_airhockey.core.recording import read_recording
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.measures import interceptions, reactions
+from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.plots import plot_report
 from marl_airhockey.play.protocol import RateLimiter
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.replay import replay_of
 from marl_airhockey.play.report import summarize
-from marl_airhockey.play.session import Session
 from marl_airhockey.play.video import write_recording_video
 
 
 def test_an_episode_is_recorded_step_by_step(tmp_path):
     options = {"options": {"seconds": 2.0}, "backend": "numba"}
     match = LiveMatch("duel", {"paddle_1": "striker"}, options, seed=5)
-    session = Session(match, Recorder(tmp_path))
+    session = open_table(match, Recorder(tmp_path))
     client = session.connect()
     session.receive(client, line("hello", key="k"))
     session.receive(client, aim(-0.3, 0.1))
@@ -54,7 +54,7 @@ def test_a_replay_is_what_the_page_was_shown(tmp_path):
     options = {"options": {"seconds": 2.0}, "backend": "numba"}
     seats = {"paddle_0": "allround", "paddle_1": "striker"}
     match = LiveMatch("duel", seats, options, seed=5)
-    session = Session(match, Recorder(tmp_path))
+    session = open_table(match, Recorder(tmp_path))
     match.start()
     shown = []
     while match.phase != "done":
@@ -76,7 +76,7 @@ def test_recordings_become_a_report(tmp_path):
         seats = {"paddle_0": "person", "paddle_1": "striker:strength=fair"}
         options = {"options": {"seconds": 6.0}}
         match = LiveMatch("duel", seats, options, seed=seed)
-        session = Session(match, Recorder(tmp_path))
+        session = open_table(match, Recorder(tmp_path))
         client = session.connect()
         session.receive(client, line("hello", key="alice"))
         session.receive(client, line("start"))
@@ -88,7 +88,7 @@ def test_recordings_become_a_report(tmp_path):
     match.start()
     for _ in range(4 * RATE):
         session.tick()
-    session.recorder.end(match, "a player has left")
+    session.host.recorder.end(match, "a player has left")
     found = summarize(tmp_path)
     assert found.episodes == 4
     assert found.broken_off == 1
@@ -129,7 +129,7 @@ def test_reactions_and_interceptions_are_measured_right():
 
 def test_a_match_whose_players_change_does_not_count(tmp_path):
     match = LiveMatch("duel", {"paddle_1": "still"}, {}, seed=1)
-    session = Session(match, Recorder(tmp_path))
+    session = open_table(match, Recorder(tmp_path))
     first = session.connect()
     session.receive(first, line("hello", key="a"))
     session.receive(first, line("start"))

@@ -8,13 +8,14 @@ from pages import aim, line
 from study_steps import PLAN, answer, consent, enter, plan_writer, play, stage
 
 from marl_airhockey.core.recording import read_head
+from marl_airhockey.play.host import GONE, GRACE
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.report import summarize
-from marl_airhockey.play.session import GONE, GRACE, IDLE
+from marl_airhockey.play.seats import IDLE
 from marl_airhockey.study.admission import ABSENT
 from marl_airhockey.study.answers import read_answers
 from marl_airhockey.study.archive import diaries, erase
-from marl_airhockey.study.study import Study
+from marl_airhockey.study.study import open_study
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def plan(tmp_path):
 
 def test_a_participant_goes_through_a_plan(plan, tmp_path):
     out = tmp_path / "out"
-    study = Study(plan(), out)
+    study = open_study(plan(), out)
     client, other = enter(study, "a"), enter(study, "b")
     assert stage(study, client) == {"stage": "consent"}
     assert client.seat is None
@@ -92,7 +93,7 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
 
 def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     out = tmp_path / "out"
-    study = Study(plan(), out)
+    study = open_study(plan(), out)
     first = enter(study, "a")
     consent(study, first)
     study.receive(first, line("start"))
@@ -119,7 +120,7 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
 def test_people_play_each_other_and_either_can_withdraw(plan, tmp_path):
     text = PLAN.replace('"still", {name = "striker", reaction = 100}', '"person"')
     out = tmp_path / "out"
-    study = Study(plan(text), out)
+    study = open_study(plan(text), out)
     subject, partner = enter(study, "a"), enter(study, "b")
     consent(study, subject)
     play(study, subject)
@@ -142,7 +143,7 @@ def test_people_play_each_other_and_either_can_withdraw(plan, tmp_path):
 
 
 def test_a_participant_who_goes_may_come_back_or_is_given_up(plan, tmp_path):
-    study = Study(plan(), tmp_path / "out")
+    study = open_study(plan(), tmp_path / "out")
     client = enter(study, "a")
     consent(study, client)
     study.receive(client, line("start"))
@@ -155,13 +156,13 @@ def test_a_participant_who_goes_may_come_back_or_is_given_up(plan, tmp_path):
     assert study.match.phase == "countdown"
     twin = enter(study, "a")
     assert twin.seat is None, "the same page twice"
-    study._check_presence(time.monotonic() + IDLE + 1)
+    study.host.check_presence(time.monotonic() + IDLE + 1)
     assert study.match.phase == "pause"
     assert back.seat == 0, "who thinks keeps the seat"
     study.disconnect(twin)
     study.disconnect(back)
-    study._check_presence(time.monotonic() + IDLE + ABSENT + 2)
-    assert study.participant is None
+    study.host.check_presence(time.monotonic() + IDLE + ABSENT + 2)
+    assert study.host.people.participant is None
     (diary,) = diaries(tmp_path / "out")
     assert diary.rows[-1]["reason"] == "left"
     other = enter(study, "b")
@@ -176,7 +177,7 @@ def test_a_participant_who_goes_may_come_back_or_is_given_up(plan, tmp_path):
 
 def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
     out = tmp_path / "out"
-    study = Study(plan(), out)
+    study = open_study(plan(), out)
     client = enter(study, "a")
     consent(study, client)
     code = stage(study, client)["code"]
@@ -184,14 +185,14 @@ def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
         play(study, client)
     answer(study, client)
     first = study.match.drivers.names[1]
-    study = Study(plan(), out)
+    study = open_study(plan(), out)
     other, client = enter(study, "b"), enter(study, "a")
     assert stage(study, other)["stage"] == "busy"
     again = stage(study, client)
     assert (again["code"], again["stage"], again["block"]) == (code, "ready", 1)
     assert study.match.drivers.names[1] == first, "the second opponent, as before"
     play(study, client)
-    study = Study(plan(), out)
+    study = open_study(plan(), out)
     client = enter(study, "a")
     while stage(study, client)["stage"] == "over":
         pass
@@ -199,8 +200,8 @@ def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
     answer(study, client)
     assert stage(study, client)["stage"] == "end"
     study.disconnect(client)
-    study._check_presence(time.monotonic() + GRACE + 1)
-    assert study.participant is None, "who is through lets the next one in"
+    study.host.check_presence(time.monotonic() + GRACE + 1)
+    assert study.host.people.participant is None, "who is through lets the next one in"
     answers = read_answers(out)
     assert (answers.participants, answers.complete, len(answers.answers)) == (1, 1, 4)
     assert {row["choice"] for row in answers.answers} == {"a program", ""}
@@ -208,7 +209,7 @@ def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
 
 
 def test_whom_the_leader_erases_is_out(plan, tmp_path):
-    study = Study(plan(), tmp_path / "out")
+    study = open_study(plan(), tmp_path / "out")
     client = enter(study, "a")
     consent(study, client)
     erase(tmp_path / "out", stage(study, client)["code"])
@@ -223,14 +224,14 @@ def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
         .replace('opponents = ["still", {name = "striker", reaction = 100}]', "")
         .replace("practice = 1", "practice = 0")
     )
-    study = Study(plan(text), tmp_path / "a")
+    study = open_study(plan(text), tmp_path / "a")
     client = enter(study, "a")
     consent(study, client)
     play(study, client)
     answer(study, client)
     assert stage(study, client)["stage"] == "end"
     assert read_answers(tmp_path / "a").games[0]["result"] in ("won", "lost")
-    study = Study(plan(PLAN.replace("rest = 0", "rest = 50")), tmp_path / "b")
+    study = open_study(plan(PLAN.replace("rest = 0", "rest = 50")), tmp_path / "b")
     client = enter(study, "a")
     consent(study, client)
     play(study, client)

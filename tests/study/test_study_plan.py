@@ -9,7 +9,7 @@ from study_steps import PLAN, plan_writer
 from marl_airhockey.study.archive import claim_folder
 from marl_airhockey.study.plan import EXAMPLE, Opponent, Plan
 from marl_airhockey.study.plan_file import load_plan
-from marl_airhockey.study.study import Study
+from marl_airhockey.study.study import open_study
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_the_order_can_be_drawn_or_fixed_and_follows_the_seed(plan):
 def test_a_bad_plan_is_named(plan, tmp_path, old, new, complaint):
     assert old in PLAN
     with pytest.raises(ValueError, match=complaint):
-        Study(plan(PLAN.replace(old, new)), tmp_path / "out")
+        open_study(plan(PLAN.replace(old, new)), tmp_path / "out")
 
 
 def test_a_folder_is_that_of_one_plan(plan, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import marl_airhockey as ah
 from marl_airhockey.contracts.scenario import Transition
 from marl_airhockey.core.touches import TOUCH_GAP, count_touches, no_touches
-from marl_airhockey.toolkit.lifts import lifts, no_lifts
+from marl_airhockey.toolkit.rewards import lifts, no_lifts
 
 DT = 0.05
 SCENE = ah.make_scenario("juggle").scene

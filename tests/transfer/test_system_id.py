@@ -5,8 +5,8 @@ import pytest
 
 from marl_airhockey.core.physics import load_physics
 from marl_airhockey.play.live_match import RATE, LiveMatch
+from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.play.session import Session
 from marl_airhockey.registry import make_agent
 from marl_airhockey.transfer.recorded_play import load_recordings, record_play
 from marl_airhockey.transfer.system_id import FITTED, fit_physics
@@ -48,7 +48,7 @@ def test_an_arm_is_nearer_to_the_fitted_table():
 def test_recordings_are_fitted_to(tmp_path):
     seats = {"paddle_0": "striker"}
     match = LiveMatch("juggle", seats, {"physics": OTHER}, seed=0)
-    session = Session(match, Recorder(tmp_path))
+    session = open_table(match, Recorder(tmp_path))
     for _ in range(6):
         match.start()
         while match.phase != "done":

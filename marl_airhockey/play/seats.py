@@ -1,0 +1,123 @@
+"""Seats of a match: which page has which, and how people steer their paddles."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from marl_airhockey.play.client import Client
+from marl_airhockey.play.live_match import LiveMatch
+from marl_airhockey.play.match_drivers import PERSON
+from marl_airhockey.play.real_match import RealMatch
+
+IDLE = 60.0
+"""Time without a movement after which a person counts as idle, s."""
+LET_GO = 0.3
+"""Time without news of a held pointer after which a real arm rests, s"""
+
+
+class Seats:
+    """Pages of a match and their seats.
+
+    Args:
+        match: Match whose paddles they steer.
+    """
+
+    def __init__(self, match: LiveMatch) -> None:
+        self.match = match
+        self.clients: set[Client] = set()
+        """Connected pages, with a seat or without."""
+
+    @property
+    def free(self) -> list[int]:
+        """Seats for people that nobody has taken."""
+        taken = {client.seat for client in self.clients}
+        names = enumerate(self.match.drivers.names)
+        return [i for i, name in names if name == PERSON and i not in taken]
+
+    @property
+    def players(self) -> list[dict[str, Any]]:
+        """Driver, person's pseudonym and consent of each seat; None for programs."""
+        people = {c.seat: (c.name, c.consent) for c in self.clients}
+        rows = []
+        for i, driver in enumerate(self.match.drivers.names):
+            person, consent = people.get(i, (None, None))
+            rows.append(
+                {"seat": i, "driver": driver, "person": person, "consent": consent}
+            )
+        return rows
+
+    @property
+    def delays(self) -> list[float | None]:
+        """Round trip of the page at each seat, ms; None where it is unknown."""
+        found: list[float | None] = [None] * len(self.match.seats)
+        for client in self.clients:
+            if client.seat is not None:
+                found[client.seat] = client.round_trip
+        return found
+
+    def may_control(self, client: Client) -> bool:
+        """Return True for pages with a seat, and for all if only programs play."""
+        return client.seat is not None or PERSON not in self.match.drivers.names
+
+    def take(self, client: Client, seat: int) -> None:
+        """Give a page a seat."""
+        client.seat, client.last_input = seat, time.monotonic()
+
+    def leave(self, client: Client, reason: str) -> None:
+        """Take a page's seat away and pause the match."""
+        assert client.seat is not None
+        mouse: Any = self.match.drivers.input_device(client.seat, "mouse")
+        mouse.rest()
+        client.seat = None
+        self.match.pause(reason)
+
+    def is_idle(self, client: Client, now: float) -> bool:
+        """Return True for a page with a seat whose person has not moved for `IDLE`."""
+        return client.seat is not None and now - client.last_input > IDLE
+
+    def aim(
+        self, client: Client, x: float, y: float, held: int, q: int, rtt: float
+    ) -> None:
+        """Set the target of a page's paddle, table frame, m; a message of pages.
+
+        Args:
+            client: Page.
+            x: Target.
+            y: Target.
+            held: 1 while the pointer is held down.
+            q: Number of the message.
+            rtt: Last round trip, ms; 0 if unknown.
+        """
+        if client.seat is None:
+            return
+        mouse: Any = self.match.drivers.input_device(client.seat, "mouse")
+        if held:
+            client.last_held = time.monotonic()
+        if held or not isinstance(self.match, RealMatch):
+            mouse.aim(*self.match.to_ego(client.seat, x, y))
+        else:
+            mouse.rest()
+        if (x, y) != client.pointer:
+            client.pointer, client.last_input = (x, y), time.monotonic()
+        client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
+
+    def stick(self, client: Client, x: float, y: float, q: int, rtt: float) -> None:
+        """Set the tilt of a page's stick, shares of full tilt; a message of pages."""
+        if client.seat is None:
+            return
+        gamepad: Any = self.match.drivers.input_device(client.seat, "gamepad")
+        gamepad.push(*self.match.to_ego(client.seat, x, y))
+        client.last_held = time.monotonic()
+        if (x, y) != (0.0, 0.0):
+            client.last_input = time.monotonic()
+        client.acknowledged, client.round_trip = q, rtt if rtt > 0.0 else None
+
+    def rest_unheld(self, now: float) -> None:
+        """Let paddles rest whose person holds nothing, or is not heard any more."""
+        drivers = self.match.drivers
+        for client in self.clients:
+            if client.seat is not None and now - client.last_held > LET_GO:
+                kind = drivers.kind_of_device(client.seat)
+                device: Any = drivers.input_device(client.seat, kind)
+                device.rest()

@@ -1,0 +1,408 @@
+"""Env-steps and agent-steps per CPU-second, in rounds with others in one run.
+
+    python scripts/bench/env.py --rounds 5 --seconds 2 \
+        --vmas X/bin/python --jaxmarl Y/bin/python
+
+One world at a time: our dict environment, a bare loop of pymunk's own step over the
+very same world (paddle velocities set, pucks put back as often as episodes restart),
+PettingZoo's multiwalker (pip install box2d) and mpe2's simple_tag. Many at a time: our
+arrays, and VMAS and JaxMARL, each in an interpreter of its own that works only in its
+rounds, on one thread as ours does. Actions are drawn beforehand; resets are included.
+VMAS has no automatic reset: its worlds are reset all together every 100 steps, which
+costs it least. Rates are per CPU-second of the process that steps, which a busy machine
+disturbs less than wall time; ratios are medians over the rounds.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+import marl_airhockey as ah
+from marl_airhockey.backends.pymunk.backend import PymunkBackend
+
+Play = Callable[[], int]
+"""Steps for a moment and says how many env-steps that were."""
+Made = tuple[Play, int]
+"""An environment: what steps it, and its agents."""
+MeasureRound = Callable[[float], dict[str, float]]
+"""Steps for so many CPU-seconds and says steps, agents and the CPU-seconds."""
+CHUNK = 512
+"""Steps of one world between two looks at the clock."""
+PYMUNK_WORLDS, WORLDS = 256, 4096
+ONE_THREAD = {
+    "JAX_PLATFORMS": "cpu",
+    "OMP_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
+}
+FOOTBALL = {
+    "n_blue_agents": 2,
+    "n_red_agents": 2,
+    "ai_red_agents": False,
+    "ai_blue_agents": False,
+}
+VMAS_HELP = "Its python: python -m venv X && X/bin/pip install torch vmas."
+JAX_HELP = "Its python: python -m venv Y && Y/bin/pip install jaxmarl."
+
+
+def parallel(env: Any) -> Made:
+    """Any PettingZoo ParallelEnv with random actions."""
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    agents = list(env.possible_agents)
+    spaces = {agent: env.action_space(agent) for agent in agents}
+    drawn: list[dict[str, Any]] = []
+    for _ in range(CHUNK):
+        row = {}
+        for agent, space in spaces.items():
+            if hasattr(space, "n"):
+                row[agent] = int(rng.integers(space.n))
+            else:
+                row[agent] = rng.uniform(-1, 1, space.shape).astype(np.float32)
+        drawn.append(row)
+
+    def play() -> int:
+        for row in drawn:
+            if len(env.agents) < len(agents):
+                if not env.agents:
+                    env.reset()
+                row = {agent: row[agent] for agent in env.agents}
+            env.step(row)
+        return CHUNK
+
+    return play, len(agents)
+
+
+def ours(scenario: str, backend: str) -> Made:
+    """Return the PettingZoo environment of a scenario, ready to be stepped."""
+    return parallel(ah.parallel_env(scenario, backend=backend))
+
+
+def bare(scenario: str) -> Made:
+    """Chipmunk's step alone over the world of our environment."""
+    env = ah.parallel_env(scenario, backend="pymunk")
+    env.reset(seed=0)
+    backend = env.world.backend
+    assert isinstance(backend, PymunkBackend)
+    space, state = backend.spaces[0], env.world.state
+    position, velocity = state.position[0], state.velocity[0]
+    paddle, chipmunk = space.bodies.all[0], space.space
+    drawn = np.random.default_rng(0).uniform(-0.7, 0.7, (CHUNK, 2)).tolist()
+    substeps, dt, touching = space.substeps, space.dt, state.touching[0]
+    count = 0
+
+    def play() -> int:
+        nonlocal count
+        for vx, vy in drawn:
+            count += 1
+            if count % 40 == 0:
+                space.reset(position, velocity, state.angle[0], state.spin[0], touching)
+            paddle.velocity = (vx, vy) if count & 1 else (-vx, -vy)
+            for _ in range(substeps):
+                chipmunk.step(dt)
+        return CHUNK
+
+    return play, 1
+
+
+def worlds(scenario: str, backend: str, number: int) -> Made:
+    """Our arrays over many worlds at once, restarts included."""
+    world = ah.make_world(scenario, number, backend=backend)
+    world.reset(0)
+    drawn = np.random.default_rng(0).uniform(-1, 1, (64, number, len(world.open), 2))
+    count = 0
+
+    def play() -> int:
+        nonlocal count
+        count += 1
+        world.step(drawn[count & 63])
+        return number
+
+    return play, len(world.open)
+
+
+def multiwalker() -> Made:
+    """PettingZoo's multiwalker: three walkers on Box2D."""
+    from pettingzoo.sisl import multiwalker_v9
+
+    return parallel(multiwalker_v9.parallel_env())
+
+
+def simple_tag() -> Made:
+    """mpe2's simple_tag: four agents, numpy."""
+    from mpe2 import simple_tag_v3
+
+    return parallel(simple_tag_v3.parallel_env())
+
+
+def vmas(scenario: str, number: int, options: dict[str, Any]) -> Made:
+    """VMAS; runs in an interpreter that has it."""
+    torch = import_module("torch")
+    torch.set_num_threads(1)
+    make = import_module("vmas").make_env
+    env = make(scenario, num_envs=number, device="cpu", seed=0, **options)
+    torch.manual_seed(0)
+    drawn = [
+        [2 * torch.rand(number, *space.shape) - 1 for space in env.action_space]
+        for _ in range(100)
+    ]
+    count = 0
+
+    def play() -> int:
+        nonlocal count
+        if count % len(drawn) == 0:
+            env.reset()
+        env.step(drawn[count % len(drawn)])
+        count += 1
+        return number
+
+    return play, len(env.agents)
+
+
+def jaxmarl(scenario: str, number: int, length: int) -> Made:
+    """JaxMARL, scanned over so many steps a call; runs in an interpreter that has it.
+
+    Observations, rewards and dones are carried, so that no compiler leaves them out.
+    """
+    jax = import_module("jax")
+    env = import_module("jaxmarl").make(scenario)
+    start, *given = jax.random.split(jax.random.PRNGKey(0), 2 + env.num_agents)
+    keys = jax.random.split(given[0], (length, number))
+    actions = {
+        agent: jax.random.randint(key, (length, number), 0, env.action_space(agent).n)
+        for agent, key in zip(env.agents, given[1:], strict=True)
+    }
+    step = jax.vmap(env.step)
+
+    def advance(last: Any, row: Any) -> Any:
+        return step(row[0], last[1], row[1])[:4], None
+
+    scan = jax.jit(partial(jax.lax.scan, advance))
+    _, state = jax.vmap(env.reset)(jax.random.split(start, number))
+    last = step(keys[0], state, {a: rows[0] for a, rows in actions.items()})[:4]
+
+    def play() -> int:
+        nonlocal last
+        last = jax.block_until_ready(scan(last, (keys, actions)))[0]
+        return length * number
+
+    return play, env.num_agents
+
+
+def clocked(play: Play, agents: int, seconds: float) -> dict[str, float]:
+    """Measure a round by this process's CPU clock; never without a step."""
+    began = time.process_time()
+    steps = play()
+    while (spent := time.process_time() - began) < seconds:
+        steps += play()
+    return {"steps": steps, "agents": agents, "cpu": spent}
+
+
+def serve(make: Callable[..., Made], *args: Any) -> None:
+    """Answer each line of seconds by a round's line of JSON: the side of a peer."""
+    with open(os.dup(1), "w") as answers:
+        os.dup2(2, 1)  # what a peer itself prints is no answer
+        play, agents = make(*args)
+        for line in sys.stdin:
+            found = clocked(play, agents, float(line))
+            print(json.dumps(found), file=answers, flush=True)
+
+
+def peer(
+    stack: ExitStack, python: Path, make: Callable[..., Made], *args: Any
+) -> MeasureRound:
+    """Start an environment in another interpreter, by the source of what it needs."""
+    program = "\n".join(
+        (
+            "from __future__ import annotations",
+            "import json, os, sys, time",
+            "from functools import partial",
+            "from importlib import import_module",
+            *(inspect.getsource(part) for part in (clocked, serve, make)),
+            f"serve({make.__name__}, *{args!r})",
+        )
+    )
+    child = stack.enter_context(
+        subprocess.Popen(
+            [python, "-I", "-c", program],
+            env=os.environ | ONE_THREAD,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+    )
+    asks, answers = child.stdin, child.stdout
+    assert asks is not None
+    assert answers is not None
+
+    def measure_round(seconds: float) -> dict[str, float]:
+        print(seconds, file=asks, flush=True)
+        if not (line := answers.readline()):
+            raise typer.BadParameter(f"{python}: no answer from {make.__name__}{args}")
+        found: dict[str, float] = json.loads(line)
+        return found
+
+    return measure_round
+
+
+@dataclass
+class Row:
+    """Environment that is measured, warmed up when made, and its rounds."""
+
+    name: str
+    measure_round: MeasureRound
+    unit: str
+    """What is compared: "env-steps" with one world, "agent-steps" with many"""
+    found: list[dict[str, float]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.measure_round(0.0)
+
+    @property
+    def agents(self) -> int:
+        """Number of agents."""
+        return int(self.found[0]["agents"])
+
+    def rates(self, unit: str) -> np.ndarray:
+        """Per CPU-second, a number for each round."""
+        rates = np.array(
+            [
+                measure_round["steps"] / measure_round["cpu"]
+                for measure_round in self.found
+            ]
+        )
+        return rates * self.agents if unit == "agent-steps" else rates
+
+    def to_json(self, mine: Row) -> dict[str, Any]:
+        """Medians, and how many times faster ours is."""
+        steps = self.rates("env-steps")
+        ratio = mine.rates(self.unit) / self.rates(self.unit)
+        return {
+            "name": self.name,
+            "env_steps_per_cpu_s": float(np.median(steps)),
+            "agent_steps_per_cpu_s": float(np.median(steps)) * self.agents,
+            "agents": self.agents,
+            "spread": float(np.ptp(steps) / np.median(steps)),
+            "compared": self.unit,
+            "ours": mine.name,
+            "ours_over_this": float(np.median(ratio)),
+            "lowest": float(ratio.min()),
+            "highest": float(ratio.max()),
+        }
+
+
+def rows(
+    stack: ExitStack,
+    scenario: str,
+    vmas_python: Path | None,
+    jax_python: Path | None,
+    number: int,
+) -> list[Row]:
+    """All that can be measured here; the first of each unit is what others compare to.
+
+    Args:
+        stack: ends the peers' interpreters.
+        scenario: ours.
+        vmas_python: an interpreter that has VMAS.
+        jax_python: an interpreter that has JaxMARL.
+        number: worlds of VMAS and JaxMARL.
+    """
+    out = []
+    many = f"ours, {WORLDS} worlds, numba"
+    few = f"ours, {PYMUNK_WORLDS} worlds, pymunk"
+    here: list[tuple[str, str, Callable[[], Made]]] = [
+        ("ours, dict env, numba", "env-steps", lambda: ours(scenario, "numba")),
+        ("ours, dict env, pymunk", "env-steps", lambda: ours(scenario, "pymunk")),
+        ("bare pymunk steps", "env-steps", lambda: bare(scenario)),
+        ("multiwalker", "env-steps", multiwalker),
+        ("mpe2 simple_tag", "env-steps", simple_tag),
+        (many, "agent-steps", lambda: worlds(scenario, "numba", WORLDS)),
+        (few, "agent-steps", lambda: worlds(scenario, "pymunk", PYMUNK_WORLDS)),
+    ]
+    for name, unit, make in here:
+        try:
+            out.append(Row(name, partial(clocked, *make()), unit))
+        except ImportError as error:
+            print(f"{name}: left out ({error})", file=sys.stderr)
+    away: list[tuple[str, Path | None, Callable[..., Made], str, Any]] = [
+        ("VMAS football", vmas_python, vmas, "football", FOOTBALL),
+        ("VMAS simple_tag", vmas_python, vmas, "simple_tag", {}),
+        ("JaxMARL simple_tag", jax_python, jaxmarl, "MPE_simple_tag_v3", 50),
+    ]
+    for name, python, make_peer, theirs, option in away:
+        if python is not None:
+            measure_round = peer(stack, python, make_peer, theirs, number, option)
+            out.append(Row(f"{name}, {number} worlds", measure_round, "agent-steps"))
+    return out
+
+
+def show(found: list[dict[str, Any]], title: str) -> Table:
+    """Return a table, with a line between env-steps and agent-steps."""
+    ours = {row["compared"]: row["ours"] for row in found}
+    units = "; ".join(f"{unit} of {name}" for unit, name in ours.items())
+    table = Table("", title=title, caption=f"ours: {units}")
+    heads = ("env-steps\nper CPU-s", "agent-steps\nper CPU-s", "agents", "spread")
+    for head in (*heads, "ours / this", "per round"):
+        table.add_column(head, justify="right")
+    for row, after in zip(found, [*found[1:], found[-1]], strict=True):
+        table.add_row(
+            row["name"],
+            f"{row['env_steps_per_cpu_s']:,.0f}",
+            f"{row['agent_steps_per_cpu_s']:,.0f}",
+            str(row["agents"]),
+            f"{row['spread']:.0%}",
+            f"{row['ours_over_this']:.3g}",
+            f"{row['lowest']:.3g}..{row['highest']:.3g}",
+            end_section=row["compared"] != after["compared"],
+        )
+    return table
+
+
+Python = partial(typer.Option, exists=True, dir_okay=False)
+
+
+def main(
+    scenario: Annotated[str, typer.Option(help="Ours.")] = "juggle",
+    rounds: Annotated[int, typer.Option(help="Turns.", min=1)] = 5,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds a round.")] = 2.0,
+    vmas_python: Annotated[Path | None, Python("--vmas", help=VMAS_HELP)] = None,
+    jax_python: Annotated[Path | None, Python("--jaxmarl", help=JAX_HELP)] = None,
+    peer_worlds: Annotated[
+        int, typer.Option(help="Of VMAS and JaxMARL, each.", min=1)
+    ] = 1024,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Run all in rounds and print rates and ratios."""
+    with ExitStack() as stack:
+        measured = rows(stack, scenario, vmas_python, jax_python, peer_worlds)
+        for _ in range(rounds):
+            for row in measured:
+                row.found.append(row.measure_round(seconds))
+    mine = {row.unit: row for row in reversed(measured)}
+    found = [row.to_json(mine[row.unit]) for row in measured]
+    console = Console()
+    if as_json:
+        console.print_json(data=found)
+        return
+    console.width = max(console.width, 112)
+    console.print(show(found, f"{scenario}: {rounds} rounds of {seconds} CPU-s"))
+
+
+if __name__ == "__main__":
+    typer.run(main)

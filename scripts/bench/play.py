@@ -1,0 +1,175 @@
+"""Benchmark of the page: how soon a moved pointer is seen, in headless Chromium.
+
+    python scripts/bench/play.py --seconds 20
+
+Two cases: one player against a policy; two players and watchers (connections that take
+every frame as a page does). For each: the time from a pointer event to the picture
+that shows the server's answer, frames of state per second, the server's loop
+rate and its share of a core. Browser, watchers and server share the machine's cores,
+whose load is printed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+import websockets
+from playwright.sync_api import Browser, Page, sync_playwright
+from rich.console import Console
+from rich.table import Table
+
+ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+POINTER_RATE = 60
+"""Pointer events per second and player, at moments drawn at random: browser, server and
+pointer run at nearly the same rate, and one would measure their phases."""
+
+
+def serve(*options: str) -> tuple[str, subprocess.Popen[str]]:
+    """Start `airhockey play`; return its address and process."""
+    command = [sys.executable, "-m", "marl_airhockey.cli", "play", "duel", *options]
+    process = subprocess.Popen(
+        [*command, "--port", "0", "--no-browser", "--option", "seconds=600"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    found = re.search(r"http://\S+", process.stdout.readline())
+    assert found is not None
+    return found[0], process
+
+
+def cpu(pid: int) -> float:
+    """Return the CPU-seconds that a process has used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+class Watchers:
+    """Connections that take every frame, in a thread of their own."""
+
+    def __init__(self, address: str, count: int) -> None:
+        self._address = address.replace("http", "ws") + "ws"
+        self._count, self._loop = count, asyncio.new_event_loop()
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        self._loop.run_until_complete(self._all())
+
+    async def _all(self) -> None:
+        await asyncio.gather(*(self._one() for _ in range(self._count)))
+
+    async def _one(self) -> None:
+        async with websockets.connect(self._address) as socket:
+            with contextlib.suppress(websockets.ConnectionClosed):
+                while True:
+                    json.loads(await socket.recv())
+
+
+def seated(browser: Browser, address: str) -> Page:
+    """Open a page that gets a seat."""
+    size: Any = {"width": 1000, "height": 600}
+    page = browser.new_page(viewport=size, bypass_csp=True)
+    page.goto(address)
+    page.wait_for_function("window.airhockey.frames.length > 9")
+    return page
+
+
+def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
+    """Move the pointers of all pages for a while; return a row of the table."""
+    boxes = []
+    for page in pages:
+        box = page.locator("#table").bounding_box()
+        assert box is not None
+        boxes.append(box)
+        page.evaluate("airhockey.frames.length = airhockey.latencies.length = 0")
+    rates: list[float] = []
+    rng = np.random.default_rng(0)
+    began, used, events = time.perf_counter(), cpu(pid), 0
+    while time.perf_counter() - began < seconds:
+        angle = 3.0 * (time.perf_counter() - began)
+        for page, box in zip(pages, boxes, strict=True):
+            x = box["x"] + box["width"] * (0.25 + 0.08 * math.cos(angle))
+            y = box["y"] + box["height"] * (0.5 + 0.15 * math.sin(angle))
+            page.mouse.move(x, y)
+        events += 1
+        if events % POINTER_RATE == 0:
+            rates.append(float(pages[0].evaluate("airhockey.state().rate")))
+        due = began + (events + rng.random()) / POINTER_RATE
+        time.sleep(max(0.0, due - time.perf_counter()))
+    spent = time.perf_counter() - began
+    used = cpu(pid) - used
+    late: list[float] = []
+    frames = 0
+    for page in pages:
+        late += page.evaluate("airhockey.latencies")
+        frames += page.evaluate("airhockey.frames.length")
+    p50, p99 = np.percentile(late, [50, 99])
+    return [
+        f"{p50:.1f}",
+        f"{p99:.1f}",
+        f"{len(late)}",
+        f"{frames / spent / len(pages):.1f}",
+        f"{np.mean(rates):.2f}",
+        f"{used / spent:.1%}",
+        f"{os.getloadavg()[0]:.1f}",
+    ]
+
+
+def main(
+    seconds: Annotated[float, typer.Option(help="Of each case.")] = 20.0,
+    watchers: Annotated[int, typer.Option(help="In the second case.")] = 20,
+) -> None:
+    """Measure and print."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        raise SystemExit("there is no Chromium here: apt-get install chromium")
+    table = Table(
+        "case", "p50 ms", "p99 ms", "events", "frames/s", "loop Hz", "server", "load"
+    )
+    cases: list[tuple[str, list[str], int, int]] = [
+        ("1 player", [], 1, 0),
+        (
+            f"2 players, {watchers} watchers",
+            ["--seat", "paddle_1=person"],
+            2,
+            watchers,
+        ),
+    ]
+    with sync_playwright() as playwright:
+        for name, options, players, crowd in cases:
+            address, process = serve(*options)
+            # A browser each: a page that lies behind another is drawn less often.
+            browsers = [
+                playwright.chromium.launch(executable_path=chromium, args=ARGS)
+                for _ in range(players)
+            ]
+            try:
+                pages = [seated(browser, address) for browser in browsers]
+                Watchers(address, crowd)
+                pages[0].keyboard.press("Space")
+                time.sleep(5.0)
+                table.add_row(name, *measure(pages, process.pid, seconds))
+            finally:
+                for browser in browsers:
+                    browser.close()
+                process.kill()
+                process.wait()
+    Console().print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)

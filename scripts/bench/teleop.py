@@ -1,0 +1,161 @@
+"""Benchmark of teleoperation in the virtual lab: how late one sees, and leads.
+
+    python scripts/bench/teleop.py --seconds 20
+
+By mouse: `airhockey teleop` in headless Chromium, the button held and the paddle led;
+printed is the time from the middle of a picture's exposure until the page has drawn
+it, and the part of it that the lab's camera takes by itself (exposure, readout,
+transfer). By shadow: a hand goes around under its camera and leads the arm; printed is
+the time by which the arm is behind the hand, and how far it is off when that is taken
+off. Browser, lab, arm and camera share the machine's cores, whose load is printed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Annotated
+
+import numpy as np
+import typer
+from playwright.sync_api import Page, sync_playwright
+from rich.console import Console
+from rich.table import Table
+
+import marl_airhockey as ah
+from marl_airhockey.lab.calibration.delay import find_delay
+from marl_airhockey.lab.calibration.lab_rig import hand_rig, lab_rig, running_lab
+from marl_airhockey.lab.hand_camera import FIELD
+from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.types import Array
+
+ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+HAND = {"middle": [0.0, 0.0], "amplitude": [0.08, 0.12], "period": 3.0}
+CONTROL_DT = 0.05
+"""s"""
+CAUGHT = 4.0
+"""Time after which the hand leads, s: it has come by the arm's paddle"""
+
+
+def lead(page: Page, seconds: float) -> list[float]:
+    """Lead the paddle to and fro; return what the page says of its video, ms."""
+    page.locator("#go").click()
+    box = page.locator("#table").bounding_box()
+    assert box is not None
+    page.mouse.down()
+    told: list[float] = []
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        state = page.evaluate("airhockey.state()")
+        if state["phase"] in ("pause", "done"):
+            page.locator("#go").click()
+            page.mouse.down()
+        angle = 2.0 * time.monotonic()
+        x = box["x"] + box["width"] * 0.2
+        page.mouse.move(x, box["y"] + box["height"] * (0.5 + 0.15 * np.sin(angle)))
+        drawn = state["table"]["drawn_ms"]
+        if drawn is not None and state["phase"] == "play":
+            told.append(float(drawn))
+        page.wait_for_timeout(50)
+    return told
+
+
+def by_mouse(seconds: float) -> list[float]:
+    """Return what a page in Chromium says of its video, ms."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        raise SystemExit("there is no Chromium here: apt-get install chromium")
+    command = [sys.executable, "-m", "marl_airhockey.cli", "teleop", "juggle", "--lab"]
+    with tempfile.TemporaryDirectory() as folder:
+        process = subprocess.Popen(
+            [*command, "--out", folder, "--port", "0", "--no-browser"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert process.stdout is not None
+        found = re.search(r"http://\S+", process.stdout.readline())
+        assert found is not None
+        try:
+            with sync_playwright() as playwright:
+                browser = playwright.chromium.launch(
+                    executable_path=chromium, args=ARGS
+                )
+                page = browser.new_page(
+                    viewport={"width": 1300, "height": 700}, bypass_csp=True
+                )
+                page.goto(found[0])
+                page.wait_for_function("window.airhockey.frames.length > 9")
+                told = lead(page, seconds)
+                browser.close()
+        finally:
+            process.terminate()
+            process.wait()
+    return told
+
+
+def by_shadow(seconds: float) -> tuple[float, float]:
+    """Return how late the arm is, s, and how far off then in the median, m."""
+    with running_lab() as client, lab_rig() as table, hand_rig() as hand:
+        client.ask("hand", **HAND)
+        world = ah.make_world(
+            *("reach", 1),
+            backend="real",
+            rig=str(table),
+            options={"table": "full_size"},
+            profile="ur5e",
+            drivers={"paddle_0": f"shadow:rig={hand}"},
+            max_cycles=round(seconds / CONTROL_DT),
+        )
+        reach = np.array(world.scene.seats[0].reach)
+        low, high = reach.min(0), reach.max(0)
+        hands, arms = [], []
+        try:
+            world.reset(0)
+            for k in range(world.max_cycles - 1):
+                result = world.step(np.zeros((1, 0, 2)))
+                if result.interruption:
+                    raise SystemExit(f"the arm stopped: {result.interruption}")
+                seen, truth = client.ask("hand_camera"), client.ask("truth")
+                if k > CAUGHT / CONTROL_DT:
+                    way = (high - low) / FIELD * seen["place"]
+                    hands.append([seen["time"], *((low + high) / 2 + way)])
+                    arms.append([truth["time"], *truth["paddle"][:2]])
+        finally:
+            world.close()
+    return _behind(np.array(arms), np.array(hands))
+
+
+def _behind(arm: Array, hand: Array) -> tuple[float, float]:
+    """Return the time by which the arm is behind, s, and what is off then, m."""
+    inside = arm[:, 0] > hand[0, 0] + 0.5
+    delay = find_delay(arm[inside], hand)
+    then = arm[inside, 0] - delay
+    there = np.stack([np.interp(then, hand[:, 0], hand[:, k]) for k in (1, 2)], 1)
+    return delay, float(np.median(np.linalg.norm(arm[inside, 1:] - there, axis=1)))
+
+
+def main(
+    seconds: Annotated[float, typer.Option(help="Of each case.")] = 20.0,
+) -> None:
+    """Measure and print."""
+    told = by_mouse(seconds)
+    own = 1e3 * LabSetup().latency
+    drawn = float(np.median(told))
+    rows = Table("", "ms", "load")
+    load = f"{os.getloadavg()[0]:.1f}"
+    rows.add_row("mouse: exposed until drawn, p50", f"{drawn:.1f}", load)
+    rows.add_row("  of that the camera's own", f"{own:.1f}", "")
+    rows.add_row("  captured until drawn", f"{drawn - own:.1f}", "")
+    delay, off = by_shadow(seconds)
+    rows.add_row("shadow: arm behind the hand", f"{1e3 * delay:.0f}", load)
+    rows.add_row("  off then, mm", f"{1e3 * off:.1f}", "")
+    Console().print(rows)
+
+
+if __name__ == "__main__":
+    typer.run(main)

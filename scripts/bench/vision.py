@@ -1,0 +1,194 @@
+"""Measure the eye of the real table on pictures whose truth is known.
+
+    python scripts/bench/vision.py --seconds 60
+
+A puck flies over the virtual lab's table, meets rails and a paddle that sweeps to and
+fro, and its camera takes pictures of it, with lens, noise, blur, shadows and the arm in
+the way. Printed for each way of calibrating the camera: how far from the truth the puck
+is seen (where half of it or more is visible), how wrong the filter's velocity is at the
+moment of each picture, and the CPU time of finding the puck in one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from marl_airhockey.backends.real.tracker import Tracker
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.devices.camera import Frame
+from marl_airhockey.devices.vision import Colour, Detector, Sighting
+from marl_airhockey.devices.vision.calibration import (
+    find_tags,
+    tag_corners,
+    view_from_clicks,
+    view_from_tags,
+)
+from marl_airhockey.devices.vision.edges import refine_corners
+from marl_airhockey.devices.vision.lens import View
+from marl_airhockey.lab.setup import BEHIND, LabSetup
+from marl_airhockey.lab.table_camera import Seen, TableCamera, lab_view, tag_places
+from marl_airhockey.lab.world import RATE, LabWorld
+from marl_airhockey.types import Array
+
+SERVE = 5.0
+"""Time after which the puck is served anew, s"""
+CLICK = 1.5
+"""Standard error of a click, px"""
+
+
+class Shot(NamedTuple):
+    """Picture with its truth."""
+
+    time: float
+    """s"""
+    paddle: Array
+    """(2,) m"""
+    puck: Array
+    """(2,) m"""
+    velocity: Array
+    """(2,) of the puck, m/s"""
+    picture: Array
+    """(H, W, 3)"""
+
+
+class Sweep:
+    """Paddle that sweeps to and fro over its reach."""
+
+    def __init__(self, setup: LabSetup) -> None:
+        self._home, self._size = setup.home, np.array([0.10, 0.25])
+
+    def at(self, now: float) -> tuple[Array, Array]:
+        """Return place, m, and velocity, m/s, at a time, s."""
+        rate = np.array([1.9, 1.3])
+        place = self._home + self._size * np.sin(rate * now)
+        return place, self._size * rate * np.cos(rate * now)
+
+
+def calibrations(camera: TableCamera, setup: LabSetup) -> dict[str, View]:
+    """Return views by the way in which they were found."""
+    table, true = setup.geometry, lab_view(setup.geometry)
+    away = Seen(None, np.zeros(2), setup.home, np.zeros(2))
+    images = [camera.photograph(away, k) for k in range(6)]
+    seen = [find_tags(image) for image in images]
+    steady = set(seen[0]).intersection(*seen[1:])
+    tags = {k: np.mean([each[k] for each in seen], axis=0) for k in steady}
+    known = {k: tag_corners(place) for k, place in tag_places(table).items()}
+    corners = np.asarray(table.vertices)
+    flat = np.column_stack([corners, np.zeros(len(corners))])
+    noise = np.random.default_rng(0).normal(0.0, CLICK, corners.shape)
+    clicks = true.project(flat) + noise
+    mean = np.mean(images, axis=0).astype(np.uint8)
+    fine = refine_corners(mean, clicks, true.lens)
+    return {
+        "tags of measured places": view_from_tags(tags, known, true.lens),
+        "four clicks, refined by edges": view_from_clicks(fine, corners, true.lens),
+        "four clicks alone": view_from_clicks(clicks, corners, true.lens),
+    }
+
+
+def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
+    """Return what the camera saw."""
+    edge = -float(setup.geometry.offsets[0])
+    base = np.array([edge - BEHIND, 0.0])
+    camera = TableCamera(setup.geometry, lab_view(setup.geometry), base)
+    world, sweep = LabWorld(setup), Sweep(setup)
+    rng, every = np.random.default_rng(1), round(RATE / rate)
+    shots = []
+    for k in range(round(seconds * RATE)):
+        now = (k + 1) / RATE
+        if k % round(SERVE * RATE) == 0:
+            place = rng.uniform([0.0, -0.3], [0.85, 0.3])
+            world.put(place, rng.uniform([-1.5, -1.0], [0.5, 1.0]), held=False)
+        paddle, moving = sweep.at(now)
+        world.step(paddle, moving, 0.0)
+        if k % every == 0:
+            seen = Seen(world.puck, world.puck_velocity, paddle, moving)
+            picture = camera.photograph(seen, k)
+            shots.append(Shot(now, paddle, world.puck, world.puck_velocity, picture))
+    return shots
+
+
+def measure(
+    view: View, setup: LabSetup, shots: list[Shot], colour: Colour
+) -> dict[str, float]:
+    """Return the errors of one view on pictures."""
+    table = setup.geometry
+    length, width = (float(x) for x in table.size / 2)
+    detector = Detector(view, colour, table.puck_radius, (length, width))
+    scene = LabWorld(setup).scene
+    tracker = Tracker(scene, Physics(scene.defaults, "ur5e"))
+    sweep, state = Sweep(setup), scene.still_state(1)
+    spent, found, last = 0.0, 0, 0.0
+    place_off: list[float] = []
+    velocity_off: list[float] = []
+    first: list[Sighting] = []
+    for now, paddle, puck, velocity, picture in shots:
+        began = time.process_time()
+        sighting = detector.find(Frame(picture, now, 0))
+        spent += time.process_time() - began
+        if sighting is not None:
+            found += 1
+            if sighting.share > 0.5:
+                place_off.append(float(np.linalg.norm(sighting.place - puck)))
+        served = now // SERVE != last // SERVE
+        first = [] if served else first
+        last = now
+        if sighting is None:
+            continue
+        if len(first) < 3:
+            first.append(sighting)
+            if len(first) == 3:
+                tracker.begin(first, paddle)
+            continue
+        times = now - 0.008 * np.arange(100, -1, -1)
+        track = np.array([[t, *sweep.at(t)[0]] for t in times])
+        tracker.fill(state, [sighting], track, now, now - 0.05)
+        if now % SERVE > 0.25:
+            estimate = tracker.estimate
+            assert estimate is not None
+            velocity_off.append(float(np.linalg.norm(estimate[2:] - velocity)))
+    place, speed = 1e3 * np.array(place_off), np.array(velocity_off)
+    return {
+        "found": found / len(shots),
+        "mean": float(place.mean()),
+        "p95": float(np.percentile(place, 95)),
+        "most": float(place.max()),
+        "rmse": float(np.sqrt((speed**2).mean())),
+        "median": float(np.median(speed)),
+        "cpu": 1e3 * spent / len(shots),
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--rate", type=float, default=60.0, help="pictures a second")
+    given = parser.parse_args()
+    cv2.setNumThreads(1)
+    setup = LabSetup()
+    shots = film(setup, given.seconds, given.rate)
+    edge = -float(setup.geometry.offsets[0])
+    camera = TableCamera(
+        setup.geometry, lab_view(setup.geometry), np.array([edge - BEHIND, 0.0])
+    )
+    there = Seen(np.array([0.3, 0.0]), np.zeros(2), setup.home, np.zeros(2))
+    x, y = lab_view(setup.geometry).project(np.array([[0.3, 0.0, 0.003]]))[0]
+    colour = Colour.around(camera.photograph(there), (float(x), float(y)))
+    print(f"{len(shots)} pictures, {given.rate:.0f} a second")
+    for name, view in calibrations(camera, setup).items():
+        m = measure(view, setup, shots, colour)
+        print(
+            f"{name:30} found {m['found']:.1%}; place {m['mean']:.2f} mm mean, "
+            f"{m['p95']:.2f} p95, {m['most']:.1f} at most; velocity {m['rmse']:.3f} "
+            f"m/s RMSE, {m['median']:.3f} median; {m['cpu']:.2f} CPU-ms a picture"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""Compare the speed of this tree with that of another checkout, in rounds of one run.
+
+    python scripts/compare/speed.py CHECKOUT
+
+measures the dict environment and 4096 worlds in steps per CPU-second of a process for
+each tree, with the compiled 2D backend, called batched in commit ec48060. The ratio is
+the median over the rounds, each of which measures both trees one after the other.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+CASES = ("juggle dict", "duel dict", "juggle 4096", "duel 4096")
+MEASURE = """
+import sys, time
+import numpy as np
+import marl_airhockey as ah
+
+backend = "batched" if "batched" in ah.backend_names() else "numba"
+scenario, kind = sys.argv[1:]
+if kind == "dict":
+    env = ah.parallel_env(scenario, backend=backend)
+    draws = np.random.default_rng(0).uniform(-1, 1, (512, 2)).astype(np.float32)
+    env.reset(seed=0)
+    def play():
+        for k in range(512):
+            step = env.step({agent: draws[k] for agent in env.agents})
+            if not env.agents:
+                env.reset()
+        return 512
+else:
+    world = ah.make_world(scenario, int(kind), backend=backend)
+    shape = (8, int(kind), len(world.open), 2)
+    draws = np.random.default_rng(0).uniform(-1, 1, shape)
+    world.reset(0)
+    def play():
+        for actions in draws:
+            world.step(actions)
+        return 8 * int(kind)
+for _ in range(10):
+    play()
+for line in sys.stdin:
+    steps, began = 0, time.process_time()
+    while (spent := time.process_time() - began) < float(line):
+        steps += play()
+    print(steps / spent, flush=True)
+"""
+
+
+def start(stack: ExitStack, tree: Path, case: str) -> subprocess.Popen[str]:
+    """Start a process that answers each line of seconds with steps per CPU-second."""
+    child = subprocess.Popen(
+        [sys.executable, "-c", MEASURE, *case.split()],
+        env={**os.environ, "PYTHONPATH": str(tree)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd="/",
+    )
+    return stack.enter_context(child)
+
+
+def ask(child: subprocess.Popen[str], seconds: float) -> float:
+    """Return the steps per CPU-second of a round."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    print(seconds, file=child.stdin, flush=True)
+    return float(child.stdout.readline())
+
+
+def main(
+    checkout: Path,
+    rounds: Annotated[int, typer.Option(help="Rounds.")] = 9,
+    seconds: Annotated[float, typer.Option(help="CPU-seconds of a case.")] = 2.0,
+) -> None:
+    """Measure both trees and print their rates and ratios."""
+    table = Table("steps per CPU-s", "here", "there", "here / there", "spread")
+    trees = Path(__file__).resolve().parents[2], checkout.resolve()
+    for case in CASES:
+        with ExitStack() as stack:
+            children = [start(stack, tree, case) for tree in trees]
+            rates = np.array(
+                [[ask(child, seconds) for child in children] for _ in range(rounds)]
+            )
+            for child in children:
+                assert child.stdin is not None
+                child.stdin.close()
+        ratio = rates[:, 0] / rates[:, 1]
+        here, there = np.median(rates, axis=0)
+        spread = f"{ratio.min():.2f} .. {ratio.max():.2f}"
+        row = f"{here:,.0f}", f"{there:,.0f}", f"{np.median(ratio):.3f}", spread
+        table.add_row(case, *row)
+    Console(width=100).print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,249 @@
+"""MAPPO, IPPO and MADDPG of BenchMARL on the games of teams, and the table of all runs.
+
+    python -m venv .venv-benchmarl
+    .venv-benchmarl/bin/pip install torch 'benchmarl==1.5.2' -e .
+    .venv-benchmarl/bin/python scripts/reproduce/marl.py --seeds 3
+    .venv-benchmarl/bin/python scripts/reproduce/marl.py --seeds 0      # the table
+
+BenchMARL 1.5 wants a TorchRL below 0.12, the extra ``ecosystem`` a later one: so it has
+an environment of its own. BenchMARL is taken as it is: `AirHockey` is a task as its
+documentation asks for, over `ah.make_torchrl`, which steps all worlds at once.
+
+All policies of a team share a network; MAPPO's and MADDPG's critics see what no agent
+sees alone. In doubles the team plays against two goalkeepers. Each run that ends adds a
+row to ``docs/data/marl.csv``; one whose row is there is not trained again. A policy is
+measured at the end, by its most likely actions, over episodes it was not trained on.
+"""
+
+from __future__ import annotations
+
+import csv
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import torch
+import typer
+from benchmarl.algorithms import IppoConfig, MaddpgConfig, MappoConfig
+from benchmarl.environments.common import TaskClass
+from benchmarl.experiment import Experiment, ExperimentConfig
+from benchmarl.models.mlp import MlpConfig
+from rich.console import Console
+from rich.table import Table
+from torchrl.envs import EnvBase
+from torchrl.envs.utils import ExplorationType, set_exploration_type
+
+import marl_airhockey as ah
+from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
+
+ALGORITHMS = {"mappo": MappoConfig, "ippo": IppoConfig, "maddpg": MaddpgConfig}
+GAMES: dict[str, dict[str, Any]] = {
+    "rally": {},
+    "team_juggle": {},
+    "doubles": {"drivers": dict.fromkeys(("paddle_2", "paddle_3"), "goalkeeper")},
+}
+"""Keywords of the environment, by game"""
+SCRIPTS = ("striker", "allround")
+"""Drivers that are measured beside what was learned"""
+WORLDS, EPISODES = 100, 500
+DATA = Path(__file__).parents[2] / "docs" / "data" / "marl.csv"
+FIELDS = ("game", "policy", "seed", "frames", "success", "team_return", "cpu_minutes")
+Row = dict[str, Any]
+
+
+class AirHockey(TaskClass):  # type: ignore[misc]
+    """Task of BenchMARL's: worlds of a game, a group for each team, the true state."""
+
+    def get_env_fun(
+        self, num_envs: int, continuous_actions: bool, seed: int | None, device: Any
+    ) -> Callable[[], EnvBase]:
+        """Return what builds ``num_envs`` worlds as one environment."""
+
+        def build() -> EnvBase:
+            env = ah.make_torchrl(self.name.lower(), num_envs, device, **self.config)
+            env.set_seed(seed)
+            return env
+
+        return build
+
+    def supports_continuous_actions(self) -> bool:
+        """Return True: actions are velocities."""
+        return True
+
+    def supports_discrete_actions(self) -> bool:
+        """Return False."""
+        return False
+
+    def max_steps(self, env: EnvBase) -> int:
+        """Return the length of an episode."""
+        return int(env.world.max_cycles)
+
+    def has_render(self, env: EnvBase) -> bool:
+        """Return False, as no pictures are asked for here."""
+        return False
+
+    def group_map(self, env: EnvBase) -> dict[str, list[str]]:
+        """Return the agents of each group."""
+        return dict(env.group_map)
+
+    def observation_spec(self, env: EnvBase) -> Any:
+        """Return the spec of what agents see, without the state."""
+        spec = env.full_observation_spec_unbatched.clone()
+        del spec["state"]
+        return spec
+
+    def info_spec(self, env: EnvBase) -> None:
+        """Return None: nothing else is told."""
+
+    def state_spec(self, env: EnvBase) -> Any:
+        """Return the spec of the state, for critics."""
+        spec = env.full_observation_spec_unbatched.clone()
+        for group in env.group_map:
+            del spec[group]
+        return spec
+
+    def action_spec(self, env: EnvBase) -> Any:
+        """Return the spec of the actions."""
+        return env.full_action_spec_unbatched
+
+    def action_mask_spec(self, env: EnvBase) -> None:
+        """Return None: every action is allowed."""
+
+    @staticmethod
+    def env_name() -> str:
+        """Return the name under which results are filed."""
+        return "marl_airhockey"
+
+
+def settings(frames: int) -> ExperimentConfig:
+    """Return what all runs share: one core, 100 worlds, no logs, no files."""
+    config = ExperimentConfig.get_from_yaml()
+    config.lr, config.share_policy_params = 3e-4, True
+    config.on_policy_n_envs_per_worker = config.off_policy_n_envs_per_worker = WORLDS
+    config.on_policy_collected_frames_per_batch = 100 * WORLDS
+    config.on_policy_n_minibatch_iters, config.on_policy_minibatch_size = 10, 1000
+    config.off_policy_collected_frames_per_batch = 20 * WORLDS
+    config.off_policy_n_optimizer_steps = 100
+    config.off_policy_train_batch_size = 256
+    config.off_policy_init_random_frames = 100 * WORLDS
+    config.max_n_frames, config.max_n_iters = frames, None
+    config.evaluation, config.loggers, config.create_json = False, [], False
+    config.save_folder = tempfile.mkdtemp()
+    return config
+
+
+def measure(experiment: Experiment, game: str) -> tuple[float, float]:
+    """Return the success and the mean return of a team, episodes cut at their end."""
+    env = ah.make_torchrl(game, EPISODES, **GAMES[game])
+    env.set_seed(TEST_SEED)
+    seen = env.reset()
+    going = torch.ones(EPISODES, dtype=torch.bool)
+    paid, succeeded = torch.zeros(EPISODES), torch.zeros(EPISODES, dtype=torch.bool)
+    with torch.no_grad(), set_exploration_type(ExplorationType.DETERMINISTIC):
+        while bool(going.any()):
+            seen = env.step(experiment.policy(seen))["next"]
+            paid += going * seen["team_0", "reward"][:, 0, 0]
+            success = torch.as_tensor(env.world.episode.success[:, 0].copy())
+            succeeded |= going & success
+            going &= ~seen["done"][:, 0]
+    env.close()
+    return float(succeeded.float().mean()), float(paid.mean())
+
+
+def train_cell(game: str, algorithm: str, seed: int, frames: int) -> Row:
+    """Train one policy and return its row."""
+    began = time.process_time()
+    experiment = Experiment(
+        task=AirHockey(game.upper(), GAMES[game]),
+        algorithm_config=ALGORITHMS[algorithm].get_from_yaml(),
+        model_config=MlpConfig.get_from_yaml(),
+        critic_model_config=MlpConfig.get_from_yaml(),
+        seed=seed,
+        config=settings(frames),
+    )
+    experiment.run()
+    minutes = (time.process_time() - began) / 60
+    success, paid = measure(experiment, game)
+    values = game, algorithm, seed, experiment.total_frames, success, paid, minutes
+    return dict(zip(FIELDS, values, strict=True))
+
+
+def play_script(game: str, name: str) -> Row:
+    """Return the row of a team of scripts."""
+    mate = {"paddle_1": name, **GAMES[game].get("drivers", {})}
+    result = evaluate(
+        ah.make_agent(name),
+        game,
+        episodes=EPISODES,
+        name=name,
+        exact=True,
+        drivers=mate,
+    )
+    values = game, name, "", 0, result.success, result.returns, 0.0
+    return dict(zip(FIELDS, values, strict=True))
+
+
+def read() -> list[dict[str, str]]:
+    """Return the rows there are."""
+    if not DATA.exists():
+        return []
+    with DATA.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def add(row: Row) -> None:
+    """Write a row at the end of the file."""
+    new = not DATA.exists()
+    row |= {k: round(v, 4) for k, v in row.items() if isinstance(v, float)}
+    with DATA.open("a", newline="") as file:
+        writer = csv.DictWriter(file, FIELDS)
+        if new:
+            writer.writeheader()
+        writer.writerow(row)
+
+
+def print_table() -> None:
+    """Print means over seeds, the least and the greatest beside them."""
+    headers = "game", "policy", "seeds", "frames", "success", "return", "CPU-min a seed"
+    table, rows = Table(*headers), read()
+    for game, policy in dict.fromkeys((row["game"], row["policy"]) for row in rows):
+        mine = [r for r in rows if (r["game"], r["policy"]) == (game, policy)]
+        table.add_row(
+            *(game, policy, str(len(mine)), mine[0]["frames"]),
+            *(spread([float(r[name]) for r in mine]) for name in FIELDS[4:]),
+        )
+    Console(width=110).print(table)
+
+
+def spread(values: list[float]) -> str:
+    """Return a mean and, of several values, the least and the greatest."""
+    mean = sum(values) / len(values)
+    ends = f" ({min(values):.2f} .. {max(values):.2f})" if len(values) > 1 else ""
+    return f"{mean:.2f}{ends}"
+
+
+def main(
+    games: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
+    seeds: Annotated[int, typer.Option(help="Runs of each algorithm.")] = 3,
+    frames: Annotated[int, typer.Option(help="Steps of a world in a run.")] = 500_000,
+) -> None:
+    """Train what has no row yet, then print the table."""
+    torch.set_num_threads(1)
+    chosen = games or list(GAMES)
+    done = {(row["game"], row["policy"], row["seed"]) for row in read()}
+    for game in chosen:
+        for name in SCRIPTS:
+            if (game, name, "") not in done:
+                add(play_script(game, name))
+    for seed in range(seeds):
+        for game in chosen:
+            for algorithm in ALGORITHMS:
+                if (game, algorithm, str(seed)) not in done:
+                    add(train_cell(game, algorithm, seed, frames))
+    print_table()
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,134 @@
+"""Compare policies that were trained for one table with those trained for all.
+
+    airhockey fit-table play/*.csv --base ur5e ... --out lab.toml  # see docs/teleop.md
+    python scripts/reproduce/own_table.py lab.toml --lab-seed 3 --tasks juggle
+
+The table is the virtual lab's, whose laws nobody is told but this script: it prints
+them beside the intervals of the profile. It trains policies with the profile and
+with `ur5e`, or goes on with those in the folder, and lets them play on the table as it
+truly is, in simulation; camera and arm are those of the profile, which were measured.
+Differences have 95 % intervals over the seeds of a method and their episodes.
+
+The same policies play in the lab itself, through camera and robot, by
+
+    airhockey lab --seed 3 &
+    airhockey trials lab=runs/own-table/juggle-lab-0 ... ur5e=runs/own-table/... \
+        -s juggle --backend real --lab
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from marl_airhockey.core.physics import SIMULATED
+from marl_airhockey.core.profiles import find_profile
+from marl_airhockey.evaluation.comparison import (
+    Comparison,
+    Estimates,
+    Outcomes,
+    compare,
+)
+from marl_airhockey.evaluation.evaluate import (
+    TEST_SEED,
+    EpisodeStatistics,
+)
+from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.lab.world import LabWorld
+from marl_airhockey.learn.ppo_config import preset
+from marl_airhockey.learn.train import run_training
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.world.build import Keywords, build_driven_world
+
+OPTIONS = {"table": LabSetup().table}
+EPISODES = 1000
+"""Episodes of each policy"""
+
+
+def true_laws(lab_seed: int) -> dict[str, float]:
+    """Return the laws of the lab's table, without what senses and moves."""
+    laws = LabWorld(LabSetup(), lab_seed).laws
+    return {k: float(v[0]) for k, v in laws.items() if k not in SIMULATED}
+
+
+def train_one(task: str, profile: str, seed: int, folder: Path) -> Path:
+    """Train a policy, or go on with it, and return its folder."""
+    place = folder / f"{task}-{Path(profile).stem}-{seed}"
+    changes = {"profile": profile, "options": OPTIONS, "seed": seed}
+    known = (place / "config.toml").exists()
+    run_training(None if known else preset(task, changes), place)
+    print(place, flush=True)
+    return place
+
+
+def play(task: str, runs: list[Path], keywords: Keywords) -> Outcomes:
+    """Return the outcomes of policies, each in the same episodes."""
+    found = EpisodeStatistics(EPISODES * len(runs))
+    for k, run in enumerate(runs):
+        world = build_driven_world(load_policy(run), task, EPISODES, keywords)
+        found.play(world, TEST_SEED, slice(k * EPISODES, (k + 1) * EPISODES))
+        world.close()
+    policy = np.repeat(np.arange(len(runs)), EPISODES)
+    success = found.success.astype(float)
+    return Outcomes(policy, success, found.returns, np.zeros(len(policy)))
+
+
+def print_laws(profile: str, laws: dict[str, float]) -> None:
+    """Print what the profile says of each law."""
+    table = Table("law", "true", "profile")
+    for name, (low, high) in find_profile(profile).ranges.items():
+        if name in laws:
+            table.add_row(name, f"{laws[name]:.4f}", f"{low:.4f} .. {high:.4f}")
+    Console().print(table)
+
+
+def print_result(task: str, found: Comparison) -> None:
+    """Print the success of both methods, and the difference."""
+    table = Table(task, "success", "return")
+    rows: list[tuple[str, Estimates]] = [(row.name, row) for row in found.methods]
+    rows += [(f"{gap.first} - {gap.second}", gap) for gap in found.differences]
+    for name, row in rows:
+        cells = (
+            f"{value:.3f} ({low:.3f} .. {high:.3f})"
+            for value, (low, high) in (
+                (row.success, row.success_interval),
+                (row.returns, row.returns_interval),
+            )
+        )
+        table.add_row(name, *cells)
+    Console().print(table)
+
+
+def main(
+    profile: Annotated[
+        Path, typer.Argument(help="That `airhockey fit-table` has written.")
+    ],
+    lab_seed: Annotated[int, typer.Option(help="Of the lab that was measured.")] = 0,
+    tasks: Annotated[str, typer.Option(help="Separated by commas.")] = "juggle",
+    seeds: Annotated[int, typer.Option(help="Policies of each profile.")] = 5,
+    jobs: Annotated[int, typer.Option(help="Runs at once.")] = 2,
+    folder: Annotated[Path, typer.Option(help="Of the runs.")] = Path("runs/own-table"),
+) -> None:
+    """Train, play and print."""
+    own, laws = str(profile), true_laws(lab_seed)
+    print_laws(own, laws)
+    keywords: Keywords = {"profile": own, "options": OPTIONS, "physics": laws}
+    for task in tasks.split(","):
+        cells = [
+            (task, p, seed, folder) for seed in range(seeds) for p in (own, "ur5e")
+        ]
+        with ProcessPoolExecutor(jobs) as pool:
+            runs = list(pool.map(train_one, *zip(*cells, strict=True)))
+        methods = {profile.stem: runs[::2], "ur5e": runs[1::2]}
+        outcomes = {name: play(task, of, keywords) for name, of in methods.items()}
+        print_result(task, compare(outcomes))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,77 @@
+"""Pictures for the docs: every scenario a moment into a scripted episode.
+
+python scripts/reproduce/pictures.py --out docs/images
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+
+import marl_airhockey as ah
+from marl_airhockey.render.picture import draw
+from marl_airhockey.render.renderer import Renderer
+from marl_airhockey.types import Array
+
+COLUMNS = 2
+MOMENT = 1.9
+"""Time of the picture, s, unless the episode ends before"""
+WIDE = 1.5
+"""Ratio of length to width below which tables are drawn smaller"""
+
+
+def moment(name: str, width: int) -> Array:
+    """Return a picture of a scenario with scripted drivers at all seats."""
+    seats = ah.make_scenario(name).scene.seats
+    driver = "allround" if len(seats) > 1 else "striker"
+    driver = "reacher" if name.startswith("reach") else driver
+    drivers = {f"paddle_{i}": driver for i in range(len(seats))}
+    world = ah.make_world(name, drivers=drivers)
+    world.autoreset = False
+    world.reset(2)
+    renderer = Renderer(world, "rgb_array", name.replace("_", " "))
+    over = False
+    while not over and world.state.time[0] < MOMENT:
+        step = world.step(np.zeros((1, 0, 2)))
+        over = bool(step.terminated[0] or step.truncated[0])
+        renderer.follow()
+    x, y = world.scene.table.size
+    return draw(renderer.frame(), width if x > WIDE * y else round(0.54 * width))
+
+
+def sheet(pictures: list[Array], width: int) -> Array:
+    """Return one picture of many in rows, on white."""
+    rows = []
+    for i in range(0, len(pictures), COLUMNS):
+        some = pictures[i : i + COLUMNS]
+        row = np.full((max(map(len, some)), COLUMNS * width, 3), 255, np.uint8)
+        for k, picture in enumerate(some):
+            height, wide = picture.shape[:2]
+            row[:height, k * width : k * width + wide] = picture
+        rows.append(row)
+    return np.concatenate(rows, axis=0)
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder of the PNGs.")] = Path(
+        "docs/images"
+    ),
+    width: Annotated[int, typer.Option(help="Pixels of one scene.")] = 560,
+) -> None:
+    """Play all scenarios, draw and save two sheets."""
+    out.mkdir(parents=True, exist_ok=True)
+    kinds: dict[str, list[Array]] = {"tasks": [], "games": []}
+    for name in ah.scenario_names():
+        alone = len(ah.make_scenario(name).scene.seats) == 1
+        kinds["tasks" if alone else "games"].append(moment(name, width))
+    for kind, pictures in kinds.items():
+        picture = cv2.cvtColor(sheet(pictures, width), cv2.COLOR_RGB2BGR)
+        cv2.imwrite(str(out / f"{kind}.png"), picture)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,116 @@
+"""Play duels at several reactions: who wins, how many are level, goals and shots.
+
+    python scripts/reproduce/reaction.py
+    python scripts/reproduce/reaction.py --home zoo/duel --far allround --reactions 0.15
+
+A reaction is the time by which seats see pucks and the other paddle late. Without one a
+keeper that predicts stops everything; with one attack pays. The score is by goals
+alone: a level game, which shots on goal decide, is half a win here.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+import marl_airhockey as ah
+from marl_airhockey.evaluation.stats import interval
+
+HOME, FAR = (
+    ["allround", "striker", "allround"],
+    ["goalkeeper", "goalkeeper", "allround"],
+)
+SEED = 5_000_000
+
+
+def play(
+    home: str, far: str, reaction: float, games: int, control_dt: float, width: float
+) -> tuple[str, ...]:
+    """Play whole games of two players; return the last cells of their row.
+
+    Args:
+        home: player at home.
+        far: the other.
+        reaction: s.
+        games: number of games.
+        control_dt: s.
+        width: of the goals, m.
+    """
+    world = ah.make_world(
+        "duel",
+        games,
+        drivers={"paddle_0": home, "paddle_1": far},
+        options={"reaction": reaction, "goal_width": width},
+        control_dt=control_dt,
+    )
+    world.autoreset = False
+    world.reset(SEED)
+    goals, shots = np.zeros((2, games, 2))
+    minutes, banked, banks = np.zeros((3, games))
+    playing = np.ones(games, np.bool_)
+    while playing.any():
+        before = world.memory["goals"].sum(-1)
+        step = world.step(np.zeros((games, 0, 2)))
+        state = world.state
+        banked[state.touched.any((1, 2))] = 0.0
+        banked += state.banked[:, 0, [1, 3]].sum(-1)
+        scored = playing & (world.memory["goals"].sum(-1) > before)
+        banks += scored & (banked > 0.0)
+        banked[scored] = 0.0
+        ended = playing & (step.terminated | step.truncated)
+        goals[ended] = world.memory["goals"][ended]
+        shots[ended] = goals[ended] + world.memory["stopped"][ended]
+        minutes[ended] = state.time[ended] / 60.0
+        playing &= ~ended
+    world.close()
+    level = float((goals[:, 0] == goals[:, 1]).mean())
+    low, high = interval(level, games)
+    return (
+        f"{(goals[:, 0] > goals[:, 1]).mean() + level / 2:.2f}",
+        f"{level:.2f} ({low:.2f}..{high:.2f})",
+        " : ".join(f"{scored:.1f}" for scored in goals.mean(0)),
+        f"{goals.sum() / minutes.sum():.1f}",
+        f"{goals.sum() / max(shots.sum(), 1.0):.2f}",
+        f"{banks.sum() / max(goals.sum(), 1.0):.2f}",
+    )
+
+
+def main(
+    reactions: Annotated[str, typer.Option(help="s, comma-separated.")] = (
+        "0,0.05,0.1,0.15,0.2"
+    ),
+    home: Annotated[list[str], typer.Option(help="Player at home, repeatable.")] = HOME,
+    far: Annotated[list[str], typer.Option(help="The other, as often.")] = FAR,
+    games: Annotated[int, typer.Option(help="Games of each pair.")] = 200,
+    control_dt: Annotated[float, typer.Option(help="s")] = 0.05,
+    width: Annotated[float, typer.Option(help="Width of the goals, m.")] = 0.30,
+) -> None:
+    """Print a row for each reaction and pair of players."""
+    if len(home) != len(far):
+        raise typer.BadParameter(
+            f"{len(far)} for {len(home)} of --home", param_hint="--far"
+        )
+    table = Table(
+        "reaction, s",
+        "home",
+        "far",
+        "score",
+        "level",
+        "goals",
+        "goals a minute",
+        "goals a shot",
+        "of them banks",
+    )
+    for reaction in map(float, reactions.split(",")):
+        for players in zip(home, far, strict=True):
+            cells = play(*players, reaction, games, control_dt, width)
+            table.add_row(f"{reaction:g}", *players, *cells)
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    typer.run(main)
