@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
-    GoalLine,
     GoalScenario,
     Mark,
     Memory,
     RandomStreams,
-    Scene,
     State,
     Transition,
     length,
@@ -22,34 +19,25 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
+from marl_airhockey.toolkit.falling import FallingPuck
 
 
 @dataclass(frozen=True, kw_only=True)
-class HitGoal(GoalScenario):
+class HitGoal(FallingPuck, GoalScenario):
     """Task that rewards how near the rising puck has come to the circle, per metre.
 
     Only a touched and rising puck counts: a falling one crosses the circle by chance.
     """
 
+    PATH = True
     seconds: float = 10.0
     radius: float = 0.10
     """Radius of the circle (m)."""
-
-    @cached_property
-    def scene(self) -> Scene:
-        home = GoalLine("home", 0)
-        seats = (self.seat(),)
-        return Scene(self.table_geometry, seats, pucks=1, goal_lines=(home,), path=True)
-
-    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(rng, self.scene)
-        return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         worlds = len(rng)
         return {
             **super().initial_memory(state, rng),
-            "gap": starts.puck_gap(state),
             "goal": starts.uniform_box(rng, (0.05, 0.60), (-0.205, 0.205)),
             "near": np.full(worlds, np.inf),
             "entered": np.zeros(worlds, np.bool_),
@@ -65,10 +53,7 @@ class HitGoal(GoalScenario):
         }
 
     observation = (
-        observables.OwnPaddle(),
-        observables.Pucks(),
-        observables.OwnToPucks(),
-        observables.Touched(),
+        *FallingPuck.observation,
         observables.Goal((0.3, 0.2), 0.31, "puck"),
     )
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
-    GoalLine,
     GoalScenario,
     Mark,
     Memory,
     RandomStreams,
-    Scene,
     State,
     Transition,
     length,
@@ -23,17 +20,19 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
+from marl_airhockey.toolkit.falling import FallingPuck
 from marl_airhockey.toolkit.shots import draw_shots, playable_puck
 
 
 @dataclass(frozen=True, kw_only=True)
-class HitGoalVelocity(GoalScenario):
+class HitGoalVelocity(FallingPuck, GoalScenario):
     """Task that rewards the best match of the rising puck in position and velocity.
 
     The goal is a point of a legal shot at this very puck under the physics of the
     episode (see `shots.draw_shots`), so that it is feasible.
     """
 
+    PATH = True
     seconds: float = 10.0
     radius: float = 0.10
     """Radius of the circle (m)."""
@@ -43,12 +42,6 @@ class HitGoalVelocity(GoalScenario):
     """Largest error of the speed, as a share of the wanted speed."""
     speed_slack: float = 0.05
     """Further error of the speed (m/s)."""
-
-    @cached_property
-    def scene(self) -> Scene:
-        home = GoalLine("home", 0)
-        seats = (self.seat(),)
-        return Scene(self.table_geometry, seats, pucks=1, goal_lines=(home,), path=True)
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state, puck = starts.falling(rng, self.scene), playable_puck(rng, self.scene)
@@ -60,7 +53,6 @@ class HitGoalVelocity(GoalScenario):
         worlds = len(rng)
         return {
             **super().initial_memory(state, rng),
-            "gap": starts.puck_gap(state),
             "goal": np.zeros((worlds, 2)),
             "goal_velocity": np.zeros((worlds, 2)),
             "score": np.zeros(worlds),
@@ -100,10 +92,7 @@ class HitGoalVelocity(GoalScenario):
         }
 
     observation = (
-        observables.OwnPaddle(),
-        observables.Pucks(),
-        observables.OwnToPucks(),
-        observables.Touched(),
+        *FallingPuck.observation,
         observables.Goal((0.3, 0.2), 0.31, "puck"),
         observables.GoalVelocity(2.5, 0.6),
     )

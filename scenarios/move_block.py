@@ -13,7 +13,6 @@ from marl_airhockey.toolkit import (
     GoalLine,
     Memory,
     RandomStreams,
-    Scenario,
     Scene,
     State,
     Transition,
@@ -22,10 +21,11 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
+from marl_airhockey.toolkit.falling import FallingPuck
 
 
 @dataclass(frozen=True, kw_only=True)
-class MoveBlock(Scenario):
+class MoveBlock(FallingPuck):
     """Task that rewards the largest displacement of the block since the first touch.
 
     The reward is per metre. Approaching the puck, and then the puck's approach to the
@@ -66,7 +66,6 @@ class MoveBlock(Scenario):
         worlds = len(rng)
         return {
             **super().initial_memory(state, rng),
-            "gap": starts.puck_gap(state),
             "origin": state.block[:, 0].copy(),
             "near": np.full(worlds, np.inf),
             "moved": np.zeros(worlds),
@@ -88,10 +87,7 @@ class MoveBlock(Scenario):
         }
 
     observation = (
-        observables.OwnPaddle(),
-        observables.Pucks(),
-        observables.OwnToPucks(),
-        observables.Touched(),
+        *FallingPuck.observation,
         observables.Blocks(0.4),
         observables.PuckToBlocks(),
     )

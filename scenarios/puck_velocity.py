@@ -3,46 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
-    GoalLine,
     Memory,
     RandomStreams,
-    Scenario,
-    Scene,
     State,
     Transition,
-    observables,
     rewards,
-    starts,
 )
+from marl_airhockey.toolkit.falling import FallingPuck
 
 
 @dataclass(frozen=True, kw_only=True)
-class PuckVelocity(Scenario):
+class PuckVelocity(FallingPuck):
     """Task that rewards the best upward speed after a touch, and the approach."""
 
     seconds: float = 5.0
     fast: float = 1.2
     """Wanted upward speed (m/s)."""
 
-    @cached_property
-    def scene(self) -> Scene:
-        home = GoalLine("home", 0)
-        return Scene(self.table_geometry, (self.seat(),), pucks=1, goal_lines=(home,))
-
-    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(rng, self.scene)
-        return state, self.initial_memory(state, rng)
-
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         return {
             **super().initial_memory(state, rng),
-            "gap": starts.puck_gap(state),
             "rise": np.zeros(len(rng)),
         }
 
@@ -52,13 +37,6 @@ class PuckVelocity(Scenario):
             "gap": rewards.nearest(t),
             "rise": np.maximum(t.memory["rise"], rise),
         }
-
-    observation = (
-        observables.OwnPaddle(),
-        observables.Pucks(),
-        observables.OwnToPucks(),
-        observables.Touched(),
-    )
 
     def reward_terms(self, t: Transition) -> dict[str, Array]:
         """Return the terms.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
 from rich.console import Console
 from rich.progress import (
@@ -18,10 +18,10 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from marl_airhockey.jit.notices import repeated
+
 errors = Console(stderr=True)
 """Console of messages that are no results, so that output can be piped"""
-EVERY = 10.0
-"""Time between two lines, s"""
 
 
 @dataclass
@@ -85,7 +85,7 @@ def bar() -> Iterator[Progress | Lines]:
             yield progress
         return
     lines = Lines()
-    with _printed(lines):
+    with repeated(partial(_print, lines)):
         yield lines
     _print(lines)
 
@@ -98,26 +98,11 @@ def waiting(what: str) -> Iterator[None]:
             yield
         return
     lines = Lines(what, began=time.monotonic())
-    with _printed(lines):
+    with repeated(partial(_print, lines)):
         yield
-
-
-@contextmanager
-def _printed(lines: Lines) -> Iterator[None]:
-    """Print a line every ten seconds."""
-    over = threading.Event()
-
-    def repeat() -> None:
-        while not over.wait(EVERY):
-            if lines.description:
-                _print(lines)
-
-    threading.Thread(target=repeat, daemon=True).start()
-    try:
-        yield
-    finally:
-        over.set()
 
 
 def _print(lines: Lines) -> None:
-    errors.print(lines.line, markup=False, highlight=False, soft_wrap=True)
+    """Print the line of a task that has begun."""
+    if lines.description:
+        errors.print(lines.line, markup=False, highlight=False, soft_wrap=True)

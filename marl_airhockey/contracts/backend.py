@@ -16,24 +16,22 @@ from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
 MAX_PRESCRIBED_SPEED = 12.0
-"""m/s: a prescribed paddle that must be faster than this is raised, without contact."""
-
+"""Speed above which a position-driven paddle is raised and touches nothing, m/s."""
 
 PATIENCE = 0.1
-"""s: a puck that a prescribed paddle leaves no room for so long is lifted."""
+"""Time after which a puck without room beside a position-driven paddle is lifted, s."""
 MOMENTS = 10
-"""Number of equal parts of a control step between which a path has rows, for backends
-without physics steps of their own."""
+"""Number of parts of a control step in a path, for backends without physics steps."""
 
 
 class Command(NamedTuple):
-    """Motion of the paddles in a step, table frame; the arrays stay, step by step."""
+    """Command of the paddles in a step, table frame; preallocated arrays."""
 
     velocity: Array
     """(B, seats, 2) m/s, reached at the end of the step by a linear ramp"""
     prescribed: Array
-    """(B, seats, 4) position and velocity at the end of the step, m and m/s, of paddles
-    that are moved from outside; nan for all others"""
+    """(B, seats, 4) position and velocity at the end of the step, m and m/s, of
+    position-driven paddles; nan for all others"""
     closed: Array
     """(B, goal_lines) bool: wall in this step"""
     raised: Array
@@ -54,19 +52,19 @@ class Command(NamedTuple):
 class Backend(ABC):
     """Physics of B worlds with one scene.
 
-    Paddles track their command and are not pushed back by a puck, but one that is not
-    prescribed stops at a puck that cannot give way. A prescribed one that leaves a puck
-    no room for 0.1 s lifts it off the table. A backend can be
-    copied and pickled at any moment; the copy goes on by itself.
+    Paddles follow their command and are not pushed back by a puck; one that is not
+    position-driven stops at an immovable (pinned) puck. A position-driven one that
+    leaves a puck no room for 0.1 s lifts it off the table. A backend can be copied and
+    pickled at any moment; the copy is independent.
 
     Args:
-        scene: who is on the table.
-        num_worlds: B.
-        control_dt: s of a step.
-        substeps: least number of physics steps in it; None for the backend's own.
+        scene: Scene on the tables.
+        num_worlds: Number of worlds, B.
+        control_dt: Time of a step, s.
+        substeps: Least number of physics steps in it; None for the backend's own.
 
     Raises:
-        ValueError: substeps for a backend that finds contacts at their moments.
+        ValueError: Substeps for a backend that finds contacts at their moments.
     """
 
     instant_contacts: ClassVar[bool] = True
@@ -83,7 +81,7 @@ class Backend(ABC):
     timestep: ClassVar[float | None]
     """Longest physics step unless ``substeps`` is given, s; None without such steps."""
     viewpoints: ClassVar[tuple[str, ...]] = ()
-    """Names of views that it can take pictures from."""
+    """Names of the viewpoints of `photograph`."""
 
     def __init__(
         self,
@@ -97,10 +95,9 @@ class Backend(ABC):
         self.substeps = self._count(control_dt, substeps)
         """Least number of physics steps in a control step; 0 without such steps."""
         self.moments = self.substeps or MOMENTS
-        """Number of equal parts of a control step between which a path has rows."""
+        """Number of equal parts of a control step in a path, which has a row more."""
         self._rest = scene.still_state(num_worlds)
-        """State that `step` begins with before a `reset`, and whose `visible` all
-        states share, read-only."""
+        """State before a `reset`; all states share its `visible`, read-only."""
         self._before = self._rest
 
     @classmethod
@@ -137,10 +134,10 @@ class Backend(ABC):
         return None
 
     def reset(self, state: State, worlds: Array) -> None:
-        """Begin anew in some worlds, by index (W,), from rows of a state of all B.
+        """Reset some worlds, by index (W,), to rows of a state of all B.
 
-        What touches in the state has touched for long: it is no new contact and no new
-        crossing. Nothing is left of the past of these worlds.
+        Bodies that touch in the state have touched before: they make no new contact
+        and no new crossing. The past of these worlds is forgotten.
         """
         self._before = state
 
@@ -148,34 +145,34 @@ class Backend(ABC):
         """Connect to the devices of a real table, which a file describes.
 
         Raises:
-            ValueError: this backend has none, or the file makes no sense.
-            RuntimeError: a device does not answer, with the fix.
+            ValueError: This backend has none, or the file is wrong.
+            RuntimeError: A device does not answer, with the remedy.
         """
         raise ValueError(
             'rig: this backend has no devices; leave it out, or take backend="real"'
         )
 
     def expect(self, physics: Physics) -> None:
-        """Take note of the ranges in which the physics of this table may lie."""
+        """Set the ranges in which the physics of this table may lie."""
         return None
 
     def arrange(self, state: State) -> State:
-        """Bring about the state in which an episode is to begin; return that it is.
+        """Arrange the state in which an episode begins; return the measured state.
 
         Called after `reset` where `senses_itself` is true.
 
         Raises:
-            RuntimeError: it cannot be brought about, with the reason.
+            RuntimeError: It cannot be arranged, with the reason.
         """
         return state
 
     @property
     def interruption(self) -> str:
-        """Reason why the running episode cannot go on; "" while it can."""
+        """Reason why the running episode cannot continue; "" while it can."""
         return ""
 
     def sight(self) -> Array:
-        """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest picture.
+        """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest frame.
 
         Called where `senses_itself` is true.
         """
@@ -183,16 +180,16 @@ class Backend(ABC):
 
     @abstractmethod
     def stage(self, command: Command, before: State, after: State) -> Stage:
-        """Return a step of ``control_dt`` between states that stay, for all worlds.
+        """Return a step of ``control_dt`` between preallocated states, for all worlds.
 
-        It fills the `RESULTS` of ``after`` (and ``path``, if the scene asks for it);
+        It fills the `RESULTS` of ``after`` (and ``path``, if the scene has one);
         ``before`` is the state that it filled last, or that of a `reset`.
         """
 
     def step(self, command: Command) -> State:
         """Return the state after a step, freshly allocated.
 
-        For use without a `World`, which runs `stage` on arrays that stay.
+        For use without a `World`, which runs `stage` on preallocated arrays.
         """
         after = self.empty_state()
         self.stage(command, self._before, after)()
@@ -210,9 +207,9 @@ class Backend(ABC):
         return State(bodies=bodies, visible=visible, path=path, **fields)
 
     def telemetry(self) -> dict[str, Any]:
-        """Return what the devices of a real table tell of themselves; JSON values.
+        """Return what the devices of a real table report; JSON values.
 
-        The command that was ``asked`` for and the one that was ``sent``, m/s, are
+        The requested command, ``asked``, and the one that was ``sent``, m/s, are
         among them. A simulation has none.
         """
         return {}
@@ -228,5 +225,5 @@ class Backend(ABC):
         raise NotImplementedError
 
     def close(self) -> None:
-        """Free whatever the backend holds."""
+        """Free the resources of the backend."""
         return None

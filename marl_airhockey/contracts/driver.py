@@ -1,8 +1,8 @@
 """Driver contract: whatever moves a paddle.
 
-A driver *asks* for a velocity (policy, script, mouse) and the backend moves the paddle,
-or it *prescribes* where the paddle is (a hand under a camera, a robot with its own
-controller) and the backend follows.
+A driver requests an action (policy, script, mouse) and the backend moves the paddle, or
+it is position-driven (a hand under a camera, a robot with its own controller): it
+measures where the paddle is, and the backend follows.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class View:
-    """Senses of one seat in B worlds."""
+    """View of one seat in B worlds: what its driver knows."""
 
     scene: Scene
     """Seats, bodies and goal lines on the table."""
     state: State
     """The sensed state, rotated into the seat's ego frame."""
     read: Callable[[], Array | Mapping[str, Array]]
-    """Reader of `observation`, as scripts that never look at it need not pay for it."""
+    """Reader of `observation`, so that scripts without one do not pay for it."""
     labels: tuple[str, ...]
     """Name of each element of a flat observation."""
     top_speed: Array
@@ -37,13 +37,13 @@ class View:
     reach: Array
     """(K, 2) corners of the seat's reach, ego frame, m."""
     rng: RandomStreams
-    """The driver's own random streams, one a world."""
+    """Random streams of the driver, one for each world."""
     seat: int
     """Index of the seat: its paddle in ``state``."""
     scenario_memory: Mapping[str, Array] = field(default_factory=dict)
-    """The scenario's memory, (B, *); goals in the table frame."""
+    """Memory of the scenario, (B, *); goals in the table frame."""
     reaction: float = 0.0
-    """Age of all in ``state`` but the own paddle by the rules of the game, s."""
+    """Latency of ``state`` by the rules of the game, but for the own paddle, s."""
 
     @cached_property
     def observation(self) -> Array | Mapping[str, Array]:
@@ -59,14 +59,14 @@ class Driver:
     """Driver of one seat in B worlds.
 
     Policies and scripts are pure: what they keep between steps is the memory, arrays
-    with one row a world. Environments are copied and pickled with their drivers; one
-    that owns a device leaves it behind in its ``__getstate__``.
+    with one row for each world. Environments are copied and pickled with their drivers;
+    one that owns a device drops it in its ``__getstate__``.
     """
 
     observe: str | None = None
-    """Observation that the driver wants; None for the environment's."""
+    """Form of the driver's observations; None for the environment's."""
     control_dt: float | None = None
-    """s between two decisions, a multiple of the environment's; None for the same."""
+    """Time between two actions, s, a multiple of the environment's; None: the same."""
     erratic: ClassVar[bool] = False
     """True for one that must never move a real arm."""
     needs_person: ClassVar[bool] = False
@@ -78,21 +78,21 @@ class Driver:
 
     @property
     def trouble(self) -> str:
-        """Reason, in words, why its paddle rests although it is led; "" for none."""
+        """Reason why its paddle rests although somebody moves it; "" for none."""
         return ""
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:
         """Refuse, before the first step, observations that it cannot act on.
 
         Args:
-            observation: of a few worlds, all zeros.
+            observation: Observations of a few worlds, all zeros.
 
         Raises:
-            ValueError: it cannot act on such observations, and why.
+            ValueError: It cannot act on such observations, with the reason.
         """
 
     def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
-        """Return the memory of ``worlds`` worlds whose episode begins."""
+        """Return the memory of W = ``worlds`` worlds whose episode begins."""
         return {}
 
     def act(
@@ -100,12 +100,12 @@ class Driver:
     ) -> tuple[Array, dict[str, Array]]:
         """Return the action (B, 2), fractions of top speed, and the memory.
 
-        It is not called of a driver that prescribes.
+        It is not called of a position-driven one.
         """
         raise NotImplementedError(f"{type(self).__name__} has no act()")
 
     def measured(self) -> PrescribedMotion | None:
-        """Return (B, 4) where the paddle is, if it prescribes; None if it asks."""
+        """Return the measured paddle (B, 4) if position-driven; None if it requests."""
         return None
 
     def __enter__(self) -> Self:

@@ -1,6 +1,6 @@
-"""Scenario contract: who is on the table, how it starts, what is wanted and final.
+"""Scenario contract: scene, initial states, goals, rewards and ends of episodes.
 
-Scenario functions are pure and vectorised: the same code judges one world, 4096 worlds
+Scenario functions are pure and vectorised: the same code serves one world, 4096 worlds
 and a stored dataset. Leading axes are the caller's.
 """
 
@@ -28,7 +28,7 @@ from marl_airhockey.types import Array, Memory
 
 
 class Transition(NamedTuple):
-    """One control step, as the functions of a scenario see it; leading axes (...)."""
+    """One control step, as the functions of a scenario get it; leading axes (...)."""
 
     before: State
     command: Array
@@ -51,18 +51,18 @@ class Scenario(ABC):
     """
 
     seats: str = "robot"
-    """Kind of the seats: "robot" (what a UR5e can do) or "arcade"."""
+    """Kind of the seats: "robot" (limits of a UR5e) or "arcade"."""
     table: str = "standard"
     """Table preset."""
     goals: str = "flat"
-    """"dict" shows wanted and achieved goals apart, as HER needs them."""
+    """"dict" shows desired and achieved goals separately, as HER needs them."""
     jitter_weight: float = 0.01
     """Cost of a squared change of the commanded velocity, in top speeds."""
     turning_weight: float = 0.0
     """Cost of a sudden change of direction."""
     reaction: float = 0.0
-    """Time after which seats see what pucks and other paddles did, in whole control
-    steps (s). It comes on top of what sensing takes in the profile."""
+    """Latency with which seats observe pucks and other paddles, in whole control steps
+    (s), in addition to that of the profile's sensing."""
 
     seconds: float
     """Length of an episode, s."""
@@ -84,7 +84,7 @@ class Scenario(ABC):
         if self.seconds == 0:
             raise ValueError("seconds: must be above 0")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
-            raise ValueError('goals="dict": this scenario has no wanted goal')
+            raise ValueError('goals="dict": this scenario has no desired goal')
         if self.goals == "dict" and self.reaction:
             raise ValueError('reaction: with goals="dict" seats see goals at once')
 
@@ -95,13 +95,13 @@ class Scenario(ABC):
 
     @abstractmethod
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        """Draw first states and memories of ``worlds`` worlds, one row each."""
+        """Sample initial states and memories of ``worlds`` worlds, one row each."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
         """Return the memory of an episode that begins in given states, one row each.
 
-        An episode can begin anywhere: `reset`, a state that is set from outside, a
-        replay, a real table. Scenarios add their own to what this returns.
+        An episode can begin with any state: of `reset`, of `set_state`, of a recording,
+        of a real table. Scenarios add their own arrays to what this returns.
         """
         return no_touches(state) if state.bodies.pucks else {}
 
@@ -112,17 +112,17 @@ class Scenario(ABC):
         memory: Memory,
         physics: Mapping[str, Array],
     ) -> Memory:
-        """Return the memory of an episode with what its physics decides, one row each.
+        """Return the memory of an episode with goals that depend on its physics.
 
-        Called after `reset` and `initial_memory`; most scenarios leave it alone.
+        Called after `reset` and `initial_memory`; most scenarios keep the default.
         ``physics`` holds the parameters of the episode by name, (W,) each.
         """
         return memory
 
     def update_memory(self, t: Transition) -> Memory:
-        """Return what changes in the memory by a step.
+        """Return the arrays of the memory that a step changes.
 
-        ``t.memory`` is that of before the step, ``t.new_memory`` the same with the new
+        ``t.memory`` is that before the step, ``t.new_memory`` the same with the new
         touches. An event that happens once needs a flag of its own, ``old | now``.
         """
         return {}
@@ -130,7 +130,7 @@ class Scenario(ABC):
     @property
     @abstractmethod
     def observation(self) -> tuple[Observable, ...]:
-        """Observables that a seat is shown, side by side."""
+        """Observables of a seat, concatenated in this order."""
 
     @abstractmethod
     def reward_terms(self, t: Transition) -> dict[str, Array]:
@@ -147,22 +147,22 @@ class Scenario(ABC):
     def serve(
         self, rng: RandomStreams, state: State, memory: Memory
     ) -> tuple[State, Memory]:
-        """Serve in the worlds that need it, and in these alone, one row each.
+        """Serve a puck; the rows are those of the worlds that need it.
 
-        The rows are copies, which may be changed and returned.
+        They are copies, which may be changed and returned.
         """
         raise NotImplementedError(f"{type(self).__name__} serves no puck")
 
     def eliminated(self, memory: Memory) -> Array | None:
-        """(..., seats) bool: the seat is out of the game; None where none ever is.
+        """(..., seats) bool: the seat is eliminated; None where none ever is.
 
-        Their paddles stand behind their sides, whose goal lines are wall.
+        Their paddles are behind their sides, whose goal lines become walls.
         """
         return None
 
     @abstractmethod
     def success(self, t: Transition) -> Array:
-        """(...) or (..., seats) bool: what a paper reports; latched per episode."""
+        """(...) or (..., seats) bool: the success that is reported; latched."""
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         """Return what to draw for one world, leading axes gone."""
@@ -173,7 +173,7 @@ class Scenario(ABC):
         touches = memory.get("touches")
         return "" if touches is None else f"touches {int(touches.sum())}"
 
-    # What follows is shared by all scenarios and not meant to be replaced.
+    # Final methods: do not override.
 
     @property
     def name(self) -> str:
@@ -182,7 +182,7 @@ class Scenario(ABC):
 
     @cached_property
     def table_geometry(self) -> Table:
-        """Table that the option names."""
+        """Table of the option ``table``."""
         return TABLES[self.table]
 
     def seat(self, side: int = 0, others: tuple[int, ...] = (), team: int = 0) -> Seat:
@@ -198,7 +198,7 @@ class Scenario(ABC):
         return new
 
     def all_reward_terms(self, t: Transition) -> dict[str, Array]:
-        """Return all reward terms, the regularising ones too, (..., seats) each.
+        """Return all reward terms, with the regularizing ones, (..., seats) each.
 
         goal: 1 while the goal is met, with goals="dict" instead of all others.
         jitter: ``-jitter_weight`` times the squared change of the commanded velocity,
@@ -217,9 +217,9 @@ class Scenario(ABC):
         return terms
 
     def is_terminated(self, t: Transition) -> Array:
-        """(...) bool: `terminated`; with goals="dict" only a met goal ends it.
+        """(...) bool: `terminated`; with goals="dict", the goal is met.
 
-        Where nobody serves, a puck that was lifted off the table ends it, too.
+        Without serves, a puck that was lifted off the table ends the episode, too.
         """
         met = self.goals == "dict"
         ends = self.goal_met(t.after, t.new_memory) if met else self.terminated(t)
@@ -234,11 +234,11 @@ class Scenario(ABC):
         return self.success(t)
 
     def goal_met(self, state: State, memory: Memory) -> Array:
-        """(...) bool: the wanted goal is met at a state, judged by goals alone."""
-        raise NotImplementedError(f"{type(self).__name__} has no wanted goal")
+        """(...) bool: the desired goal is met at a state, by `goal_reward` alone."""
+        raise NotImplementedError(f"{type(self).__name__} has no desired goal")
 
     def replay_memory(self, memory: Memory, states: State, command: Array) -> Memory:
-        """Fold `next_memory` over a recording without a last step by the clock.
+        """Apply `next_memory` along a recording, as if no time limit were reached.
 
         Args:
             memory: at the start, (...).
@@ -258,13 +258,13 @@ class Scenario(ABC):
 
 
 def _check_number(name: str, kind: object, value: object) -> None:
-    """Refuse what is no sane number where a field holds one."""
+    """Refuse a value of a numeric field that is no usable number."""
     if kind not in ("int", "float"):
         return
     if isinstance(value, (tuple, list)):
         raise ValueError(
             f"{name}: {value!r} is a range; rules and geometry are fixed when built, "
-            "only physics can be drawn per episode"
+            "only physics can be sampled per episode"
         )
     whole = kind == "int"
     if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -276,7 +276,7 @@ def _check_number(name: str, kind: object, value: object) -> None:
 
 
 class GoalScenario(Scenario):
-    """Scenario with a wanted goal, which can be relabelled afterwards."""
+    """Scenario with a desired goal, which can be relabelled in hindsight."""
 
     @property
     @abstractmethod
@@ -285,15 +285,15 @@ class GoalScenario(Scenario):
 
     @abstractmethod
     def achieved(self, state: State, memory: Memory) -> Array:
-        """(..., goal) what was achieved at this state."""
+        """(..., goal) achieved goal of a state."""
 
     @abstractmethod
     def desired(self, memory: Memory) -> Array:
-        """(..., goal) what is wanted."""
+        """(..., goal) desired goal."""
 
     @abstractmethod
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
-        """(...) 1 where the goal is met, else 0; of goals alone."""
+        """(...) 1 where the goal is met, else 0; a function of goals alone."""
 
     def shown_reward(self, achieved: Array, desired: Array) -> Array:
         """(...) `goal_reward` of goals from observations, in double precision."""
@@ -301,7 +301,7 @@ class GoalScenario(Scenario):
         return self.goal_reward(*goals)
 
     def goal_met(self, state: State, memory: Memory) -> Array:
-        # As an observation shows them, so that `compute_reward` agrees to the bit.
+        # In the precision of observations, so that `compute_reward` agrees to the bit.
         goals = self.achieved(state, memory), self.desired(memory)
         shown = [goal.astype(np.float32).astype(np.float64) for goal in goals]
         met: Array = self.goal_reward(*shown) > 0

@@ -1,11 +1,11 @@
-"""Notices on standard error while something is compiled, so that nobody waits blind."""
+"""Notices on standard error while something is compiled: what, and for how long."""
 
 from __future__ import annotations
 
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ PAUSE = 2.0
 EVERY = 10.0
 """Time between two notices, s"""
 FIRST, LATER = 30, 8
-"""Usual time to compile a scenario with an empty cache, and beside another one, s"""
+"""Usual time to compile a scenario with an empty cache, and after another one, s"""
 
 
 @dataclass
@@ -57,20 +57,38 @@ def announced_wait(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def _repeated(text: str, notice: _Notice) -> Iterator[None]:
-    """Print a text every ten seconds, with the time so far."""
+def repeated(say: Callable[[], None], first: float | None = None) -> Iterator[None]:
+    """Call a function every ten seconds, in a thread, until the block ends.
+
+    Args:
+        say: Function.
+        first: Time until the first call, s; None for as long as between two.
+    """
     over = threading.Event()
 
     def repeat() -> None:
-        while not over.wait(max(notice.said + EVERY - time.monotonic(), 0.0)):
-            notice.said = time.monotonic()
-            _print(f"{text}, {notice.said - notice.began:.0f} s so far")
+        wait = EVERY if first is None else first
+        while not over.wait(wait):
+            say()
+            wait = EVERY
 
     threading.Thread(target=repeat, daemon=True).start()
     try:
         yield
     finally:
         over.set()
+
+
+@contextmanager
+def _repeated(text: str, notice: _Notice) -> Iterator[None]:
+    """Print a text every ten seconds, with the time so far."""
+
+    def say() -> None:
+        notice.said = time.monotonic()
+        _print(f"{text}, {notice.said - notice.began:.0f} s so far")
+
+    with repeated(say, max(notice.said + EVERY - time.monotonic(), 0.0)):
+        yield
 
 
 def _print(text: str) -> None:

@@ -150,20 +150,16 @@ class Observer:
         return replace(sensed, **state), self._delay.delayed("memory")
 
     def prepare(self, state: State, memory: Memory) -> Sink:
-        """Return arrays for `stage` to fill, for arrays like these; none if not direct.
-
-        They are those of all seats in all worlds, by name.
-        """
+        """Return arrays (B, seats, ...) for `stage` to fill; none if not direct."""
         if not self.direct:
             return {}
-        fused, past = self._fused[self.observe], self.sensor.past()
-        (shown,) = fused.prepare(vars(state), memory, past)
-        return shown
+        fused = self._fused[self.observe]
+        return fused.prepare(vars(state), memory, self.sensor.past())[0]
 
     def stage(self, state: State, memory: Memory, shown: Sink) -> list[Stage]:
-        """Return the stage that fills ``shown`` from the true state; [] if not direct.
+        """Return the stage that fills ``shown`` from the true state, by reference.
 
-        All arrays are used by reference.
+        The list is empty if not `direct`.
         """
         if not self.direct:
             return []
@@ -193,8 +189,8 @@ class Observer:
             return self._pictures(memory, seats, worlds)
         fused, sources = self._fused[form], self._sources(sensed, memory, form)
         every = isinstance(worlds, slice)
-        (shown,) = fused(*sources) if every else fused.at(np.asarray(worlds), *sources)
-        return self.of_seats(shown, seats)
+        found = fused(*sources) if every else fused.at(np.asarray(worlds), *sources)
+        return self.of_seats(found[0], seats)
 
     def of_seats(self, shown: Sink, seats: Array) -> Observation:
         """Return the observations of some seats from those of all; no copy of all."""
@@ -203,7 +199,7 @@ class Observer:
             flat = flat[:, seats]
         if len(shown) == 1:
             return flat
-        return {"observation": flat, **{name: shown[name] for name in GOALS}}
+        return {"observation": flat} | {name: shown[name] for name in GOALS}
 
     def blank(self, form: str | None, rows: int) -> Observation:
         """Return observations of one seat that are all zeros, (rows, ...) each.
@@ -220,12 +216,11 @@ class Observer:
         if game.goals == "flat" or not isinstance(game, GoalScenario):
             return flat
         shape = (rows, len(game.goal_bounds))
-        goals = {n: np.zeros(shape, np.float32) for n in GOALS}
-        return {"observation": flat, **goals}
+        return {"observation": flat} | {n: np.zeros(shape, np.float32) for n in GOALS}
 
     def _parts(self, sensed: State, memory: Memory) -> Parts:
         """Return what is observed with the latency of the game."""
-        past = {**self.sensor.past(), "frames": self.sensor.frames}
+        past = self.sensor.past() | {"frames": self.sensor.frames}
         parts = {"state": vars(sensed), "memory": memory, "sensor": past}
         if "estimate" in self.forms:
             parts["estimate"] = vars(self.sensor.estimated(sensed))

@@ -3,10 +3,11 @@
 import time
 
 from marl_airhockey.cli import progress
+from marl_airhockey.jit import notices
 
 
 def test_lines_say_what_is_done_and_how_long_it_takes(capsys, monkeypatch):
-    monkeypatch.setattr(progress, "EVERY", 0.05)
+    monkeypatch.setattr(notices, "EVERY", 0.05)
     with progress.bar() as shown:
         task = shown.add_task("league of 3", total=4, note="")
         shown.advance(task)

@@ -1,0 +1,49 @@
+"""Falling puck: the part that tasks with a puck falling towards one seat share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from marl_airhockey.contracts.observable import Observable
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import GoalLine, Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.toolkit import observables, starts
+from marl_airhockey.types import Memory
+
+
+@dataclass(frozen=True, kw_only=True)
+class FallingPuck(Scenario):
+    """Base of tasks in which a puck falls from the far half towards one seat at home.
+
+    The home side is a goal line. Memory ``gap`` (...) is the shortest distance of the
+    paddle to the puck up to the first touch, m; subclasses continue it with
+    `rewards.nearest`.
+    """
+
+    PATH: ClassVar[bool] = False
+    """Whether states have the path of the puck within a step."""
+
+    @cached_property
+    def scene(self) -> Scene:
+        home, seats = GoalLine("home", 0), (self.seat(),)
+        table, path = self.table_geometry, self.PATH
+        return Scene(table, seats, pucks=1, goal_lines=(home,), path=path)
+
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        memory = super().initial_memory(state, rng)
+        return {**memory, "gap": starts.puck_gap(state)}
+
+    observation: ClassVar[tuple[Observable, ...]] = (
+        observables.OwnPaddle(),
+        observables.Pucks(),
+        observables.OwnToPucks(),
+        observables.Touched(),
+    )
