@@ -1,4 +1,4 @@
-"""Players of your own as drivers: functions, models with ``predict``, torch modules."""
+"""Callables as drivers: functions, models with ``predict``, torch modules."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from marl_airhockey.types import Array
 
 @dataclass
 class OwnPolicy(Policy):
-    """Policy from outside: it takes a batch of observations or one at a time.
+    """Policy of a user: it takes a batch of observations or one at a time.
 
-    Which of both is found out by asking it for the actions of three observations of
-    zeros and, should it refuse, of one.
+    `check` finds out which, by a call with three observations of zeros and, if that
+    fails, with one.
     """
 
     one_by_one: bool = False
@@ -54,13 +54,13 @@ def driver_of(player: object) -> Driver:
     """Return a player of any kind as a driver.
 
     Args:
-        player: a `Driver` or a class of drivers; a torch module or a function from
+        player: `Driver` or a class of drivers; a torch module or a function from
             observations (B, D) to actions (B, 2), or from one (D,) to (2,); an object
             with ``predict(observation, deterministic=True)``, as the models of
             stable-baselines3 have, or ``predict(observation)``.
 
     Raises:
-        ValueError: none of these.
+        ValueError: None of these.
     """
     if isinstance(player, Driver):
         return player
@@ -138,7 +138,7 @@ class _Network:
 
 
 def _ask(predict: Callable[[Any, bool], Array], observation: Any) -> Array | Exception:
-    """Return its answer, or the error that it raised."""
+    """Return the answer of a policy, or the error that it raised."""
     try:
         return np.asarray(predict(observation, True))
     except Exception as error:

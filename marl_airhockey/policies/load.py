@@ -23,15 +23,15 @@ def load_policy(
     which runs when it is loaded.
 
     Args:
-        path: of the file or folder.
-        deterministic: return mean actions instead of samples.
-        trust: whether pickled Python in this file may run; None to ask at a terminal
+        path: Path of the file or folder.
+        deterministic: Whether to return mean actions instead of samples.
+        trust: Whether pickled Python in this file may run; None to ask at a terminal
             and refuse elsewhere.
 
     Raises:
-        ValueError: a file of another kind; the message names the expected ones; or one
+        ValueError: A file of another kind; the message names the expected ones; or one
             with pickled Python that is not trusted.
-        RuntimeError: a missing extra; the message holds the command that installs it.
+        RuntimeError: A missing extra; the message holds the command that installs it.
     """
     path = Path(path)
     if path.parent == Path("zoo") and not path.exists():
@@ -52,6 +52,6 @@ def load_policy(
             f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file "
             "or an .npz"
         )
-    # Cards of older runs say less than the settings beside them.
+    # Cards of older runs have less than the settings in the same folder.
     policy.trained_in = {**run_settings(path.parent), **policy.trained_in}
     return policy

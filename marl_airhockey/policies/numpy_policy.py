@@ -41,11 +41,11 @@ class NumpyPolicy:
     """Network with ReLU layers that returns the mean action.
 
     Args:
-        layers: (out, in) weights and (out,) biases of each layer.
-        centre: (D,) subtracted from the observation.
-        unit: (D,) divisor of the difference.
-        log_std: (2,) log standard deviation of the action noise in training.
-        card: scenario and its version, settings and results of the training; with
+        layers: Weights (out, in) and biases (out,) of each layer.
+        centre: Centre (D,), subtracted from the observation.
+        unit: Divisor (D,) of the difference.
+        log_std: Log standard deviation (2,) of the action noise in training.
+        card: Scenario and its version, settings and results of the training; with
             "bounded", the hyperbolic tangent follows the last layer.
     """
 
@@ -67,8 +67,8 @@ class NumpyPolicy:
             observation = np.concatenate([observation[part] for part in parts], -1)
         if len(observation) <= FEW_ROWS:
             return self._forward(observation)
-        # Threads of BLAS wait busily for each other: for layers as small as these they
-        # cost twice the CPU time on two cores, and more on more.
+        # Threads of BLAS busy-wait for each other: for layers as small as these they
+        # cost twice the CPU time on two cores, and more on more cores.
         with _blas().limit(limits=1, user_api="blas"):
             return self._forward(observation)
 
@@ -107,7 +107,7 @@ class NumpyPolicy:
         """Read a file that `save` wrote.
 
         Raises:
-            ValueError: a file of another kind.
+            ValueError: A file of another kind.
         """
         try:
             arrays = _read(path)
@@ -122,10 +122,10 @@ class NumpyPolicy:
         return found
 
     def _check(self) -> None:
-        """Refuse layers that do not follow each other, and what is no number.
+        """Refuse layers whose shapes do not match, and elements that are no number.
 
         Raises:
-            ValueError: says what.
+            ValueError: One of these, named.
         """
         size = self.centre.size
         if self.centre.shape != (size,) or self.unit.shape != (size,):
@@ -148,7 +148,7 @@ def _read(path: Path) -> dict[str, Array]:
     """Read the arrays of an .npz, of numbers or text, with no more memory than that.
 
     Raises:
-        ValueError: too large, or something else than an array of numbers or text.
+        ValueError: Too large, or other contents than arrays of numbers or text.
     """
     arrays: dict[str, Array] = {}
     with path.open("rb") as file:

@@ -21,16 +21,16 @@ class Policy(Driver):
     """Learned policy as a driver.
 
     Outside of environments, ``predict`` is the policy itself: it takes observations
-    (B, D) as the environment of its training gives them, and whether to return the mean
-    action, and returns actions (B, 2), fractions of top speed in the ego frame. They
-    may lie a little beyond -1 .. 1, where environments clip them.
+    (B, D) of the environment of its training and whether to return the mean action, and
+    returns actions (B, 2), fractions of top speed in the ego frame. They can be a
+    little outside -1 .. 1, where environments clip them.
 
     Args:
-        predict: function (observation (B, ...), deterministic) -> action (B, 2).
-        shape: of the observation that it was trained on; None if unknown.
-        observe: form of that observation; None for the environment's.
-        source: origin of the policy, for messages.
-        deterministic: return the mean action instead of a sample.
+        predict: Function (observation (B, ...), deterministic) -> action (B, 2).
+        shape: Shape of the observation that it was trained on; None if unknown.
+        observe: Form of that observation; None for the environment's.
+        source: Origin of the policy, for messages.
+        deterministic: Whether to return the mean action instead of a sample.
     """
 
     predict: Predict
@@ -78,15 +78,15 @@ TRAINED_IN: dict[str, type | tuple[type, ...]] = {
     "control_dt": (int, float),
     "goals": str,
 }
-"""What describes the environment of a training, and its types"""
+"""Entries that describe the environment of a training, and their types"""
 
 
 def trained_in(card: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a policy's card or a run's settings say of its environment.
+    """Return the environment that a policy's card or a run's settings name.
 
     Returns:
-        The scenario's name, and keywords of environments; without what is not there or
-        is of another type, as files come from anywhere.
+        The scenario's name, and keywords of environments; entries of another type are
+        left out, as files come from anywhere.
     """
     return {
         name: card[name]

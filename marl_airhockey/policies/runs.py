@@ -15,11 +15,11 @@ Raised whenever classes that a run pickles, or settings that it names, move: run
 another format are refused.
 """
 KINDS = ("npz", "zip")
-"""File name extensions of the policies that engines write, the harmless one first."""
+"""File name extensions of the policies that engines write, the safe one first."""
 
 
 def policies_of(run: Path) -> list[Path]:
-    """Return the paths that a run's policies may have, the one to take first."""
+    """Return the possible paths of a run's policies, the best choice first."""
     return [run / f"{name}.{kind}" for kind in KINDS for name in ("best", "last")]
 
 
@@ -27,18 +27,18 @@ def check_run_format(source: Path, found: int) -> None:
     """Refuse a run of another format than `RUN_FORMAT`.
 
     Raises:
-        ValueError: another format.
+        ValueError: Another format.
     """
     if found != RUN_FORMAT:
         raise ValueError(
             f"{source}: this run was begun by another version of marl_airhockey (run "
-            f"format {found}, this version reads {RUN_FORMAT}); train it anew in "
-            "another folder"
+            f"format {found}, this version reads {RUN_FORMAT}); train it again "
+            "in another folder"
         )
 
 
 def run_settings(folder: Path) -> dict[str, Any]:
-    """Return what the settings in a run's folder say of its environment, if any."""
+    """Return the environment that the settings in a run's folder name, if any."""
     try:
         return trained_in(tomllib.loads((folder / "config.toml").read_text()))
     except (OSError, ValueError):

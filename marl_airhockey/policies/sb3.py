@@ -74,10 +74,10 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
 
 
 def model_environment(model: Any) -> dict[str, Any]:
-    """Return what a model says of the environment of its training, see `trained_in`.
+    """Return the environment that a model was trained in, see `trained_in`.
 
     Args:
-        model: of stable-baselines3, or anything else with a ``card`` or an
+        model: Model of stable-baselines3, or anything with a ``card`` or an
             ``observation_space``.
     """
     card = getattr(model, "card", None)
@@ -96,11 +96,11 @@ def numpy_actor(weights: Mapping[str, Any], card: Mapping[str, Any]) -> NumpyPol
     """Return the actor of a model of our training as plain arrays.
 
     Args:
-        weights: tensors by their names in the model's policy.
-        card: description of the policy.
+        weights: Tensors by their names in the model's policy.
+        card: Card of the policy.
 
     Raises:
-        ValueError: another kind of model: pixels, other layers.
+        ValueError: Another kind of model: pixels, other layers.
     """
     layers = [f"mlp_extractor.policy_net.{2 * i}" for i in range(len(weights))]
     layers = [*(name for name in layers if f"{name}.weight" in weights), "action_net"]
@@ -119,7 +119,7 @@ def load_weights(path: Path) -> Mapping[str, Any]:
     """Read the tensors of a zip of stable-baselines3, running nothing in it.
 
     Raises:
-        ValueError: a zip that holds something else.
+        ValueError: A zip with other contents.
     """
     import torch
 

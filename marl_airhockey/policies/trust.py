@@ -1,4 +1,4 @@
-"""Trust: code that comes from a file runs after a yes alone.
+"""Trust: code from a file runs only after a yes.
 
 Whoever unpickles a file runs what its author wrote into it. The zips of
 stable-baselines3 are such files; .npz and .onnx files hold numbers. The settings of a
@@ -25,7 +25,7 @@ class Trust:
     answer: bool | None = None
     """True: yes to all files; False: no to all; None: ask at a terminal, else no"""
     granted: ClassVar[set[Path]] = set()
-    """Files that got a yes at a terminal, so that none is asked about twice"""
+    """Files that got a yes at a terminal, so that there is one question for each"""
 
 
 def require_trust(
@@ -34,12 +34,12 @@ def require_trust(
     """Ask, unless it is known, whether the code in a file may run.
 
     Args:
-        path: of the file.
-        given: the answer for this file, if it is known.
-        code: what it is.
+        path: Path of the file.
+        given: Answer for this file, if it is known.
+        code: Description of the code.
 
     Raises:
-        ValueError: no; nothing of the file has run.
+        ValueError: The answer is no; nothing in the file has run.
     """
     answer = Trust.answer if given is None else given
     if answer is None and path in Trust.granted:

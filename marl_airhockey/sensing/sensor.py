@@ -56,7 +56,7 @@ class Sensor:
         self.control_dt, self._sight, self._keeps = control_dt, sight, needs.history
         self.camera: SimulatedCamera | None = None
         """Simulated camera; None where states are sensed exactly as they are."""
-        if physics.any_of(*SENSED):
+        if sight is None and physics.any_of(*SENSED):
             simulated = scene, num_worlds, physics, control_dt, needs.estimate
             self.camera = SimulatedCamera(*simulated)
         pucks, b = scene.bodies.pucks, num_worlds

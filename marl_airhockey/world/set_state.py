@@ -1,10 +1,10 @@
-"""States and memories that are set from outside, checked and settled.
+"""States and memories that are set from outside: checked, and without past events.
 
-`World.set_state` goes on as if every body had come there at its velocity and what
-touches had touched for long: lasting contacts and crossings are not new ones, the
-sensor's past is that of a steady motion, no delayed action is under way, and drivers
-begin anew. The clock is that of ``state.time``; returns and success begin at none.
-Episode number, seed, physics and random streams go on.
+`World.set_state` continues as if every body had moved there at its velocity and bodies
+that touch had touched before: lasting contacts and crossings are not new ones, the
+sensor's past is that of constant velocities, no delayed action is under way, and the
+memory of drivers is new. The clock is that of ``state.time``; returns and success are
+reset. Episode number, seed, physics and random streams continue.
 """
 
 from __future__ import annotations

@@ -7,6 +7,7 @@ from situations import place_puck
 import marl_airhockey as ah
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.sensing.calibration import CalibrationMap
+from marl_airhockey.sensing.sensor import Needs, Sensor
 
 LEVEL = {"preset": "frictionless", "tilt": 0.0}
 DT = 0.05
@@ -207,3 +208,27 @@ def test_sensing_costs_nothing_in_the_ideal_profile():
     world.step(np.zeros((2, 1, 2)))
     np.testing.assert_array_equal(world.sensed.position, world.state.position)
     np.testing.assert_array_equal(world.sensed.velocity, world.state.velocity)
+
+
+def test_a_backend_that_senses_itself_gets_no_simulated_camera():
+    world = ah.make_world("juggle", 1, profile="ur5e")
+    world.reset(0)
+    measured = np.array([[[0.1, 0.2, 1.0, 0.03]]])
+    sensor = Sensor(
+        *(world.scene, 1, world.physics, DT, Needs.of(["history"])),
+        sight=lambda: measured,
+    )
+    assert sensor.ideal
+    state, physics = world.state, world.episode.physics
+    sensed = sensor.reset(np.zeros(1, np.int64), state, physics, world._streams)
+    np.testing.assert_array_equal(sensed.position, state.position)
+    np.testing.assert_array_equal(sensor.history[:, -1], measured)
+
+
+def test_needs_are_collected_from_all_forms():
+    assert Needs.of(["velocity"]) == Needs(history=False, estimate=False)
+    assert Needs.of(["velocity", "history"]) == Needs(history=True, estimate=False)
+    assert Needs.of(["estimate"]) == Needs(history=True, estimate=True)
+    world = ah.make_world("juggle", 1)
+    with pytest.raises(ValueError, match="'history' cannot be read here"):
+        world.observer.layout_of("history")
