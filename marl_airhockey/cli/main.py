@@ -30,6 +30,7 @@ from marl_airhockey.cli import (
     train,
     transfer,
     trials,
+    ur_emulator,
     warm,
     watch,
 )
@@ -73,6 +74,7 @@ GROUPS = {
     "study": study.study,
     "calibrate": calibrate.calibrate,
     "lab": lab.lab,
+    "ur-emulator": ur_emulator.ur_emulator,
 }
 """Groups of commands, by name"""
 for name, function in COMMANDS.items():

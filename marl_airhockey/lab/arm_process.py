@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -13,14 +14,10 @@ import numpy as np
 from marl_airhockey.devices.block import Block
 from marl_airhockey.devices.priority import raise_priority
 from marl_airhockey.devices.robot.kinematics import pose_vector
-from marl_airhockey.lab.controller.arm import Line, Safety
-from marl_airhockey.lab.controller.server import Controller
 from marl_airhockey.lab.setup import LabSetup
-
-LIFT = 0.006
-"""Height of what lies under the paddle, a fault, m"""
-LATE = 0.1
-"""Delay of late packets, a fault, s"""
+from marl_airhockey.lab.ur_controller.arm import Line
+from marl_airhockey.lab.ur_controller.faults import FAULTS
+from marl_airhockey.lab.ur_controller.server import Controller
 
 
 def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
@@ -38,40 +35,13 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
     controller = Controller(setup.make_arm(), publish)
     arm = controller.arm
 
-    def set_silent(on: bool) -> None:
-        controller.silent = on
-
-    def set_late(on: bool) -> None:
-        controller.delay = LATE if on else 0.0
-
-    def set_raised(on: bool) -> None:
-        arm.surface.raised = LIFT if on else 0.0
-
-    def stop(on: bool) -> None:
-        if on:
-            arm.stop(Safety.PROTECTIVE_STOP, "asked for")
-            controller.dashboard.note_stop()
-        elif arm.safety is Safety.PROTECTIVE_STOP:
-            # Somebody at the pendant has unlocked it.
-            arm.release()
-
-    def press_button(on: bool) -> None:
-        if on:
-            arm.stop(Safety.ROBOT_EMERGENCY_STOP, "asked for")
-        elif arm.safety is Safety.ROBOT_EMERGENCY_STOP:
-            arm.release()
-
     def guide(place: list[float]) -> None:
         """Move as somebody guides the arm by hand."""
         arm.motion = Line(mounting.pose(np.array(place)), 0.25, 1.0)
 
     orders: dict[str, Callable[[Any], None]] = {
         "guide": guide,
-        "protective_stop": stop,
-        "emergency_stop": press_button,
-        "silent_robot": set_silent,
-        "delayed_packets": set_late,
-        "puck_under_paddle": set_raised,
+        **{name: partial(fault.switch, controller) for name, fault in FAULTS.items()},
     }
 
     async def serve() -> None:

@@ -1,14 +1,10 @@
-"""Faults: what goes wrong in the lab on demand."""
+"""Faults of the lab, which can be switched on and off."""
 
 from __future__ import annotations
 
-ARM_FAULTS = {
-    "protective_stop": "the arm stops as after a collision",
-    "emergency_stop": "somebody presses the red button",
-    "silent_robot": "the controller sends nothing more",
-    "delayed_packets": "what the controller sends comes 0.1 s late",
-    "puck_under_paddle": "the paddle is lifted by 6 mm",
-}
+from marl_airhockey.lab.ur_controller.faults import FAULTS as CONTROLLER_FAULTS
+
+ARM_FAULTS = {name: fault.what for name, fault in CONTROLLER_FAULTS.items()}
 TABLE_FAULTS = {
     "frozen_camera": "no more frames come",
     "dark_camera": "the lights are off",
@@ -16,4 +12,4 @@ TABLE_FAULTS = {
     "lost_puck": "the puck is not on the table",
 }
 FAULTS = {**ARM_FAULTS, **TABLE_FAULTS}
-"""Faults by name, in words"""
+"""Descriptions of the faults, by name"""

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import multiprocessing
-import os
-import socket
-import socketserver
 import threading
 import time
 from collections.abc import Iterator
@@ -19,6 +15,7 @@ import numpy as np
 
 from marl_airhockey.jit.cache import cache_folder
 from marl_airhockey.lab.arm_process import run_arm
+from marl_airhockey.lab.door import DoorClient, open_door, port_in
 from marl_airhockey.lab.faults import ARM_FAULTS, FAULTS
 from marl_airhockey.lab.hand_process import path_of, run_hand
 from marl_airhockey.lab.setup import LabSetup
@@ -188,79 +185,31 @@ def served(lab: Lab, announce: bool = True) -> Iterator[int]:
         lab: whose door it is.
         announce: whether other commands are to find it by the `port_file`.
     """
-
-    class Door(socketserver.StreamRequestHandler):
-        """Handler of a client, who sends a line of JSON for each order."""
-
-        def handle(self) -> None:
-            for line in self.rfile:
-                try:
-                    answer = lab.ask(json.loads(line))
-                except (ValueError, RuntimeError, KeyError, TypeError) as error:
-                    answer = {"error": str(error)}
-                self.wfile.write(json.dumps(answer).encode() + b"\n")
-
-    class Server(socketserver.ThreadingTCPServer):
-        """Server of the door."""
-
-        daemon_threads, allow_reuse_address = True, True
-
-    with Server(("127.0.0.1", 0), Door) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        port = int(server.server_address[1])
-        try:
-            if announce:
-                port_file().parent.mkdir(parents=True, exist_ok=True)
-                port_file().write_text(json.dumps({"pid": os.getpid(), "port": port}))
-            yield port
-        finally:
-            server.shutdown()
-            if announce:
-                port_file().unlink(missing_ok=True)
+    with open_door(lab.ask, port_file() if announce else None) as port:
+        yield port
 
 
-class LabClient:
+class LabClient(DoorClient):
     """Client of a lab that runs in another process.
 
     Args:
-        port: of its door.
+        port: Port of its door.
 
     Raises:
-        OSError: nobody answers there.
+        OSError: Nobody answers there.
     """
 
     def __init__(self, port: int) -> None:
-        self.port = port
-        self._socket = socket.create_connection(("127.0.0.1", port), 2.0)
-        self._socket.settimeout(2 * ANSWER)
-        self._file = self._socket.makefile("rwb")
+        super().__init__(port, "lab")
 
     @staticmethod
     def find() -> LabClient | None:
         """Return a client of the lab that runs on this machine; None without one."""
+        port = port_in(port_file())
         try:
-            return LabClient(int(json.loads(port_file().read_text())["port"]))
-        except (OSError, ValueError, KeyError):
+            return None if port is None else LabClient(port)
+        except OSError:
             return None
-
-    def ask(self, do: str, **order: Any) -> dict[str, Any]:
-        """Send an order and return the answer.
-
-        Raises:
-            RuntimeError: the lab refuses or has ended.
-        """
-        self._file.write(json.dumps({"do": do, **order}).encode() + b"\n")
-        self._file.flush()
-        line = self._file.readline()
-        answer = json.loads(line) if line else {"error": "it has ended"}
-        if "error" in answer:
-            raise RuntimeError(f"lab: {answer['error']}")
-        return dict(answer)
-
-    def close(self) -> None:
-        """Leave the lab."""
-        self._file.close()
-        self._socket.close()
 
 
 def wait_for_lab(seconds: float = START) -> LabClient:

@@ -11,7 +11,7 @@ from marl_airhockey.core.seat import Seat, make_seat
 from marl_airhockey.core.table import TABLES, Table
 from marl_airhockey.devices.robot.kinematics import inverse, pose_of, vector_of
 from marl_airhockey.devices.robot.mounting import Mounting
-from marl_airhockey.lab.controller.arm import Arm, Surface
+from marl_airhockey.lab.ur_controller.arm import Arm, Surface
 from marl_airhockey.types import Array
 
 BEHIND = 0.22

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from marl_airhockey.devices.robot import limits
-from marl_airhockey.lab.controller.state import message, state_of
 from marl_airhockey.lab.setup import TOOL, LabSetup
+from marl_airhockey.lab.ur_controller.state import message, state_of
 
 SETUP = LabSetup()
 ARM = SETUP.make_arm()

@@ -15,7 +15,7 @@ from marl_airhockey.devices.robot import Robot
 from marl_airhockey.devices.robot.ur5e import LOOK_AHEAD
 from marl_airhockey.lab.calibration.arm import along, chirp, find_lag, steps
 from marl_airhockey.lab.calibration.motion import Motion, lead
-from marl_airhockey.lab.controller.script import DEAD_TIME
+from marl_airhockey.lab.ur_controller.script import DEAD_TIME
 
 HALF_RISE = LOOK_AHEAD + DEAD_TIME
 """Time in which the lab's arm makes half of a step, s"""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import struct
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from sys import stderr
 from typing import Any
 
@@ -15,11 +15,11 @@ import numpy as np
 
 from marl_airhockey.devices.robot.kinematics import pose_vector
 from marl_airhockey.devices.robot.limits import STATE_PORT
-from marl_airhockey.lab.controller.arm import DT, SAFETY_BITS, Arm, Safety
-from marl_airhockey.lab.controller.dashboard import Dashboard
-from marl_airhockey.lab.controller.rtde import Recipe, package
-from marl_airhockey.lab.controller.script import ControlScript
-from marl_airhockey.lab.controller.state import VERSION_MESSAGE, message, state_of
+from marl_airhockey.lab.ur_controller.arm import DT, SAFETY_BITS, Arm, Safety
+from marl_airhockey.lab.ur_controller.dashboard import Dashboard
+from marl_airhockey.lab.ur_controller.rtde import Recipe, package
+from marl_airhockey.lab.ur_controller.script import ControlScript
+from marl_airhockey.lab.ur_controller.state import VERSION_MESSAGE, message, state_of
 
 DASHBOARD, RTDE = 29999, 30004
 SCRIPTS = (30001, 30002, 30003)
@@ -38,6 +38,8 @@ LATE = 0.25
 """Time by which the loop may lag before it gives up what it missed, s"""
 BEHIND = 0.006
 """Delay of a period from which on the controller counts as late, s"""
+STALL_EVERY = 250
+"""Periods from one stall to the next, a fault"""
 SPACING = 4
 """Periods between two commands of a client that sends 125 a second"""
 Handler = Callable[
@@ -72,6 +74,9 @@ class Controller:
         """True if no data is sent, a fault"""
         self.delay = 0.0
         """Time by which data is sent late, a fault, s"""
+        self.stall = 0.0
+        """Time for which the controller does nothing twice a second, a fault, s"""
+        self._refuses = False
         self._publish = publish
         self._pending: list[tuple[Recipe, bytes]] = []
 
@@ -79,6 +84,12 @@ class Controller:
         """Run a script that a client has sent."""
         if self.arm.safety is Safety.NORMAL and "def rtde_control" in text:
             self.script.start()
+
+    def refuse(self, on: bool) -> None:
+        """Close all RTDE connections and refuse new ones, or accept them again."""
+        self._refuses = on
+        for client in tuple(self.clients) if on else ():
+            client.close()
 
     def take(self, recipe: Recipe, body: bytes) -> None:
         """Keep what a client has written for the next period."""
@@ -150,14 +161,17 @@ class Controller:
             **{f"output_double_register_{i}": doubles[i] for i in range(24)},
         }
 
-    async def serve(self) -> None:
+    async def serve(self, hosts: Sequence[str] = HOSTS) -> None:
         """Serve all ports at the first address that is free, until cancelled.
 
+        Args:
+            hosts: Addresses to try, in this order.
+
         Raises:
-            RuntimeError: there is none.
+            RuntimeError: There is none.
         """
         servers: list[asyncio.Server] = []
-        for host in HOSTS:
+        for host in hosts:
             try:
                 for port, handler in self._ports.items():
                     servers.append(await asyncio.start_server(handler, host, port))
@@ -169,7 +183,11 @@ class Controller:
                 await self._run()
             finally:
                 _close(servers)
-        raise RuntimeError("no loopback address is free; is an old lab still running?")
+        what = f"{hosts[0]}: a port" if len(hosts) == 1 else "every loopback address"
+        raise RuntimeError(
+            f"{what} is taken (the ports are {', '.join(map(str, self._ports))}); is "
+            "another emulator or lab still running?"
+        )
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
@@ -178,6 +196,8 @@ class Controller:
             self.step(behind=loop.time() - due > BEHIND)
             if self.clients and not self.silent:
                 loop.call_later(self.delay, self._send, self.ticks, self.values())
+            if self.stall and self.ticks % STALL_EVERY == 0:
+                await asyncio.sleep(self.stall)
             due += DT
             wait = due - loop.time()
             await asyncio.sleep(max(wait, 0.0))
@@ -220,6 +240,9 @@ class Controller:
     async def _serve_rtde(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
+        if self._refuses:
+            writer.close()
+            return
         await RtdeConnection(self, reader, writer).serve()
 
 
@@ -271,6 +294,10 @@ class RtdeConnection:
         finally:
             self._controller.clients.discard(self)
             self._writer.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._writer.close()
 
     def send(self, tick: int, values: dict[str, Any]) -> None:
         """Send the variables, if it is their turn and the client keeps up."""

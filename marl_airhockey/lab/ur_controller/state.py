@@ -14,7 +14,7 @@ from marl_airhockey.devices.robot.limits import (
     JOINT_DATA,
     STATE,
 )
-from marl_airhockey.lab.controller.arm import JOINT_ACCELERATION, JOINT_SPEED, Arm
+from marl_airhockey.lab.ur_controller.arm import JOINT_ACCELERATION, JOINT_SPEED, Arm
 
 VERSION_MESSAGE = 20
 """Number of the first message, whose contents nobody reads here"""

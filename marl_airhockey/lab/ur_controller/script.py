@@ -12,7 +12,15 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
-from marl_airhockey.lab.controller.arm import DT, Arm, Force, Halt, Line, Safety, Speed
+from marl_airhockey.lab.ur_controller.arm import (
+    DT,
+    Arm,
+    Force,
+    Halt,
+    Line,
+    Safety,
+    Speed,
+)
 from marl_airhockey.types import Array
 
 READY, DONE = 1, 2

@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from marl_airhockey.lab.controller.arm import Safety
+from marl_airhockey.lab.ur_controller.arm import Safety
 
 if TYPE_CHECKING:
-    from marl_airhockey.lab.controller.server import Controller
+    from marl_airhockey.lab.ur_controller.server import Controller
 
 GREETING = "Connected: Universal Robots Dashboard Server"
 UNLOCK_AFTER = 5.0

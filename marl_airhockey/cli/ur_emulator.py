@@ -1,0 +1,121 @@
+"""Commands ``airhockey ur-emulator`` and ``airhockey ur-emulator fault``."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+from typing import Annotated
+
+import typer
+
+from marl_airhockey.cli.options import console
+from marl_airhockey.cli.progress import waiting
+
+ADDRESS = "127.0.0.5"
+"""Default address of the emulator"""
+Address = Annotated[
+    str,
+    typer.Option(
+        help="Loopback address of the emulated robot; each robot needs its own, as "
+        "clients cannot choose the ports."
+    ),
+]
+
+ur_emulator = typer.Typer(
+    help="An emulator of a UR5e's controller, for ur_rtde and other clients."
+)
+
+
+@ur_emulator.callback(invoke_without_command=True)
+def open_emulator(
+    context: typer.Context,
+    address: Address = ADDRESS,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Fault at a set time, NAME@3s, or NAME@3s-5s to end it again; "
+            "repeatable."
+        ),
+    ] = None,
+) -> None:
+    """Emulate a UR5e with PolyScope 5.12 until Ctrl+C.
+
+    The arm presses a paddle on an empty table. Dashboard, script and RTDE ports answer
+    as the real ones; URScript beyond the script of ur_rtde is not run.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    _check_loopback(address)
+    from marl_airhockey.lab.setup import LabSetup
+    from marl_airhockey.lab.ur_controller.emulator import (
+        ScheduledFault,
+        serve_emulator,
+    )
+    from marl_airhockey.lab.ur_controller.server import Controller
+
+    schedule = [ScheduledFault.parse(text) for text in fault or []]
+    with waiting("preparing the arm"):
+        controller = Controller(LabSetup().make_arm())
+
+    async def serve() -> None:
+        """Serve, and print the address once it answers."""
+        task = asyncio.create_task(serve_emulator(controller, address, schedule))
+        while not controller.ticks and not task.done():
+            await asyncio.sleep(0.01)
+        if not task.done():
+            console.print(
+                f"UR5e at {address}: RTDE 30004, script 30003, dashboard 29999\n"
+                f"faults: airhockey ur-emulator fault NAME --address {address}\n"
+                "Ctrl+C ends it"
+            )
+        await task
+
+    with contextlib.suppress(KeyboardInterrupt):
+        asyncio.run(serve())
+
+
+@ur_emulator.command("fault")
+def switch_fault(
+    name: Annotated[
+        str | None, typer.Argument(help="Name of the fault; None lists all.")
+    ] = None,
+    off: Annotated[bool, typer.Option("--off", help="Switch it off.")] = False,
+    address: Address = ADDRESS,
+) -> None:
+    """Switch a fault of the running emulator on or off."""
+    from marl_airhockey.lab.door import DoorClient, port_in
+    from marl_airhockey.lab.ur_controller.emulator import door_file
+    from marl_airhockey.lab.ur_controller.faults import FAULTS
+
+    if name is None:
+        for known, row in FAULTS.items():
+            console.print(f"{known:18} {row.what}")
+        return
+    port = port_in(door_file(address))
+    try:
+        client = DoorClient(port, "ur-emulator") if port is not None else None
+    except OSError:
+        client = None
+    if client is None:
+        raise RuntimeError(
+            f"ur-emulator: none is running at {address}; start one with airhockey "
+            f"ur-emulator --address {address}"
+        )
+    safety = client.ask("fault", name=name, on=not off)["safety"]
+    client.close()
+    console.print(f"{name}: {'off' if off else FAULTS[name].what}; safety {safety}")
+
+
+def _check_loopback(address: str) -> None:
+    """Refuse an address that other machines can reach, or that is none.
+
+    Raises:
+        ValueError: One of these.
+    """
+    try:
+        found = ipaddress.ip_address(address)
+    except ValueError:
+        found = None
+    if found is None or not found.is_loopback or found.version != 4:
+        raise ValueError(f"--address: {address!r} is no loopback address (127.x.x.x)")

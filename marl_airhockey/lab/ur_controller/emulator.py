@@ -1,0 +1,96 @@
+"""Emulator: a controller at an address, with faults at set times or on demand."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.lab.door import open_door
+from marl_airhockey.lab.ur_controller.faults import FAULTS
+from marl_airhockey.lab.ur_controller.server import Controller
+
+SCHEDULED = re.compile(r"(\w+)@([\d.]+)s?(?:-([\d.]+)s?)?")
+"""Form of a scheduled fault: NAME@BEGIN or NAME@BEGIN-END, s"""
+
+
+class ScheduledFault(NamedTuple):
+    """Fault at a set time."""
+
+    name: str
+    begin: float
+    """Time after the start, s"""
+    end: float | None
+    """Time after the start at which it is switched off, s; None for never"""
+
+    @staticmethod
+    def parse(text: str) -> ScheduledFault:
+        """Return the fault of a text such as ``silent_robot@3s`` or ``..@3s-5s``.
+
+        Raises:
+            ValueError: Another form, or an unknown fault.
+        """
+        found = SCHEDULED.fullmatch(text)
+        if not found:
+            raise ValueError(f"fault {text!r}: expected NAME@3s or NAME@3s-5s")
+        name, begin, end = found.groups()
+        if name not in FAULTS:
+            raise ValueError(unknown_name("fault", name, FAULTS))
+        if end is not None and float(end) <= float(begin):
+            raise ValueError(f"fault {text!r}: it must end after it begins")
+        return ScheduledFault(name, float(begin), float(end) if end else None)
+
+
+def door_file(address: str) -> Path:
+    """Return the file in which other commands find the emulator at an address."""
+    return cache_folder() / f"ur-emulator-{address}.json"
+
+
+async def serve_emulator(
+    controller: Controller,
+    address: str,
+    schedule: Sequence[ScheduledFault] = (),
+) -> None:
+    """Serve a controller at an address until cancelled.
+
+    Args:
+        controller: Controller with its arm.
+        address: Loopback address.
+        schedule: Faults at set times.
+
+    Raises:
+        RuntimeError: A port of the address is taken.
+    """
+    loop = asyncio.get_running_loop()
+
+    async def switch(name: str, on: bool) -> dict[str, Any]:
+        FAULTS[name].switch(controller, on)
+        return {"safety": controller.arm.safety.name}
+
+    def answer(order: dict[str, Any]) -> dict[str, Any]:
+        name = order.get("name")
+        if order.get("do") != "fault" or name not in FAULTS:
+            raise ValueError(unknown_name("fault", name, FAULTS))
+        switched = asyncio.run_coroutine_threadsafe(
+            switch(name, bool(order["on"])), loop
+        )
+        return switched.result(5.0)
+
+    async def follow(fault: ScheduledFault) -> None:
+        await asyncio.sleep(fault.begin)
+        await switch(fault.name, True)
+        if fault.end is not None:
+            await asyncio.sleep(fault.end - fault.begin)
+            await switch(fault.name, False)
+
+    waiting = [asyncio.create_task(follow(fault)) for fault in schedule]
+    try:
+        with open_door(answer, door_file(address)):
+            await controller.serve([address])
+    finally:
+        for task in waiting:
+            task.cancel()

@@ -1,0 +1,74 @@
+"""Faults of a controller and its arm, which can be switched on and off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from marl_airhockey.lab.ur_controller.arm import Safety
+from marl_airhockey.lab.ur_controller.server import Controller
+
+RAISED = 0.006
+"""Height of the body under the paddle, m"""
+DELAY = 0.1
+"""Delay of delayed packets, s"""
+STALL = 0.08
+"""Time for which a controller without real time does nothing, twice a second, s"""
+
+
+class Fault(NamedTuple):
+    """Fault."""
+
+    what: str
+    """What happens"""
+    switch: Callable[[Controller, bool], None]
+    """Function that switches it on or off"""
+
+
+def _protective_stop(controller: Controller, on: bool) -> None:
+    arm = controller.arm
+    if on:
+        arm.stop(Safety.PROTECTIVE_STOP, "fault")
+        controller.dashboard.note_stop()
+    elif arm.safety is Safety.PROTECTIVE_STOP:
+        # As if a person at the pendant had unlocked it.
+        arm.release()
+
+
+def _emergency_stop(controller: Controller, on: bool) -> None:
+    if on:
+        controller.arm.stop(Safety.ROBOT_EMERGENCY_STOP, "fault")
+    elif controller.arm.safety is Safety.ROBOT_EMERGENCY_STOP:
+        controller.arm.release()
+
+
+def _silent(controller: Controller, on: bool) -> None:
+    controller.silent = on
+
+
+def _delayed(controller: Controller, on: bool) -> None:
+    controller.delay = DELAY if on else 0.0
+
+
+def _dropped(controller: Controller, on: bool) -> None:
+    controller.refuse(on)
+
+
+def _stalled(controller: Controller, on: bool) -> None:
+    controller.stall = STALL if on else 0.0
+
+
+def _raised(controller: Controller, on: bool) -> None:
+    controller.arm.surface.raised = RAISED if on else 0.0
+
+
+FAULTS = {
+    "protective_stop": Fault("the arm stops as after a collision", _protective_stop),
+    "emergency_stop": Fault("somebody presses the red button", _emergency_stop),
+    "silent_robot": Fault("the controller sends no more data", _silent),
+    "delayed_packets": Fault("data of the controller come 0.1 s late", _delayed),
+    "dropped_connection": Fault("RTDE connections are closed, and refused", _dropped),
+    "loss_of_real_time": Fault("the controller stalls for 80 ms twice a s", _stalled),
+    "puck_under_paddle": Fault("the paddle is lifted by 6 mm", _raised),
+}
+"""Faults by name"""
