@@ -2,10 +2,10 @@
 
     python scripts/compare/rollouts.py CHECKOUT
 
-plays 200 steps of 3 worlds of every scenario with random actions, in both profiles and
-all forms of observations but pictures, with goals="dict" and with a driver of paddle_0
-where it has them, in a process for each tree and scenario: numba must give the same
-bits, pymunk the same numbers to 1e-9. Exits with 1 if anything differs.
+plays 200 steps of 3 worlds of every scenario with random actions, in all profiles and
+forms of observations, with goals="dict" and with a driver of paddle_0 where it has
+them, in a process for each tree and scenario: numba must give the same bits, pymunk the
+same numbers to 1e-9. Exits with 1 if anything differs.
 """
 
 from __future__ import annotations
@@ -33,6 +33,9 @@ CASES: dict[str, dict[str, Any]] = {
     "history": {"observe": "history"},
     "ur5e": {"profile": "ur5e"},
     "ur5e estimate": {"profile": "ur5e", "observe": "estimate"},
+    "authors": {"profile": "ur5e-authors"},
+    "gantry": {"profile": "gantry"},
+    "pixels": {"profile": "ur5e", "observe": "pixels"},
     "ur5e driven": {"profile": "ur5e", "drivers": {"paddle_0": "random"}},
     "dict": {"goals": "dict"},
     "ur5e dict": {"profile": "ur5e", "goals": "dict"},
