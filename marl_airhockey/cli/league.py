@@ -81,6 +81,7 @@ def play_league(
             entrants,
             games=games,
             seed=seed,
+            exact=True,
             report=lambda share: progress.update(task, completed=share),
             **keywords,
         )

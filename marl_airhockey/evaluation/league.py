@@ -30,6 +30,7 @@ def league(
     *,
     games: int = 100,
     seed: int = LEAGUE_SEED,
+    exact: bool = False,
     report: Callable[[float], None] = lambda share: None,
     **keywords: Unpack[Keywords],
 ) -> Standings:
@@ -46,6 +47,7 @@ def league(
         games: Number of games of each pair, on average if there are more than two
             sides; of two, they change ends at half of them.
         seed: Seed of the first game.
+        exact: Whether keywords that are not given have their defaults instead.
         report: Function that is called with the share of the games that is played.
         **keywords: Keywords of the environment.
 
@@ -57,8 +59,9 @@ def league(
         raise ValueError(f"players: a list of names is expected, got {players!r}")
     named = players if isinstance(players, Mapping) else {n: n for n in players}
     drivers = {name: make_agent(player) for name, player in named.items()}
-    _, keywords = as_trained(drivers, scenario, keywords)
-    drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
+    if not exact:
+        _, keywords = as_trained(drivers, scenario, keywords)
+        drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
     count = len(drivers)
     if count < 2:
         raise ValueError("a league needs at least two players, of different names")

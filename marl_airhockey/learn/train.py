@@ -95,7 +95,7 @@ def run_training(
     folder: Path,
     report: ProgressCallback | None = None,
 ) -> Metrics:
-    """Train a policy in a folder, or resume a run that was cut off.
+    """Train a policy in a folder, or resume an interrupted run.
 
     Args:
         config: Configuration of a new run; None to resume the run in the folder.

@@ -1,4 +1,4 @@
-"""Open table: a match at which whoever opens the page can take a seat."""
+"""Open table: a match at which everybody with the page can take a seat."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def open_table(
 
 
 class OpenTable(Host):
-    """Host that gives free seats to whoever comes.
+    """Host that gives a free seat to every page.
 
     Args:
         seats: Seats of the match.

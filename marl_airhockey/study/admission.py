@@ -44,7 +44,7 @@ class Admission:
         """Course and block whose opponent is seated; None for nobody's."""
 
     def hello(self, client: Client, key: str) -> None:
-        """Let a page in, and a person resume whose session was cut off."""
+        """Seat a page; resume the interrupted session of its person."""
         client.key = key
         if self.participant is None and key not in self._erased:
             self._resume(key)
@@ -133,7 +133,7 @@ class Admission:
                 self._erased.add(person.key)
 
     def withdraw(self, client: Client) -> None:
-        """Erase all that is kept of the person at a page, immediately."""
+        """Erase all data of the person at a page, immediately."""
         person = self.person(client)
         if person is None:
             return

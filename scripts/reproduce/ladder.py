@@ -63,7 +63,7 @@ def main(
 ) -> None:
     """Play the league, pick the rungs, write them with their cards, print the table."""
     players = {str(path): load_policy(path) for path in checkpoints}
-    standings = league(game, players, games=games)
+    standings = league(game, players, games=games, exact=True)
     standings.save(out)
     chain = find_chain(standings, rungs)
     low_high = standings.score_intervals

@@ -20,7 +20,7 @@ class Fault(NamedTuple):
     """Fault."""
 
     what: str
-    """What happens"""
+    """Description of what happens."""
     switch: Callable[[Controller, bool], None]
     """Function that switches it on or off"""
 
