@@ -38,6 +38,9 @@ def open_emulator(
             "repeatable."
         ),
     ] = None,
+    polyscope: Annotated[
+        str, typer.Option(help="Version of PolyScope that it reports.")
+    ] = "5.12.2",
 ) -> None:
     """Emulate a UR5e with PolyScope 5.12 until Ctrl+C.
 
@@ -48,15 +51,17 @@ def open_emulator(
         return
     _check_loopback(address)
     from marl_airhockey.lab.setup import LabSetup
+    from marl_airhockey.lab.ur_controller.controller import Controller
     from marl_airhockey.lab.ur_controller.emulator import (
         ScheduledFault,
+        parse_version,
         serve_emulator,
     )
-    from marl_airhockey.lab.ur_controller.server import Controller
 
+    version = parse_version(polyscope)
     schedule = [ScheduledFault.parse(text) for text in fault or []]
     with waiting("preparing the arm"):
-        controller = Controller(LabSetup().make_arm())
+        controller = Controller(LabSetup().make_arm(), version)
 
     async def serve() -> None:
         """Serve, and print the address once it answers."""

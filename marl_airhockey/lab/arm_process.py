@@ -13,31 +13,46 @@ import numpy as np
 
 from marl_airhockey.devices.block import Block
 from marl_airhockey.devices.priority import raise_priority
-from marl_airhockey.devices.robot.kinematics import pose_vector
 from marl_airhockey.lab.setup import LabSetup
-from marl_airhockey.lab.ur_controller.arm import Line
+from marl_airhockey.lab.ur_controller.controller import Controller
 from marl_airhockey.lab.ur_controller.faults import FAULTS
-from marl_airhockey.lab.ur_controller.server import Controller
+from marl_airhockey.lab.ur_controller.motions import Line
+from marl_airhockey.lab.ur_controller.plant import EmptyTable, PlantReading
+from marl_airhockey.lab.ur_controller.ports import Ports
+from marl_airhockey.types import Array
+
+
+class PublishedTable(EmptyTable):
+    """Table under the arm that tells another process where the paddle is.
+
+    Args:
+        setup: Setup of the lab.
+        block: Memory for time, s, position (3,), m, and velocity (2,), m/s, in the
+            table frame.
+    """
+
+    def __init__(self, setup: LabSetup, block: Block) -> None:
+        table = setup.make_table()
+        super().__init__(table.origin, table.normal)
+        self._mounting, self._block = setup.mounting, block
+
+    def __call__(self, pose: Array, velocity: Array) -> PlantReading:
+        position = self._mounting.to_table(pose)
+        moving = self._mounting.rotate_to_table(velocity)
+        self._block.write((time.monotonic(), *position, *moving[:2]))
+        return super().__call__(pose, velocity)
 
 
 def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
     """Serve an arm, tell its address, and go on until the pipe's other end closes."""
     raise_priority()
-    block, mounting = Block(np.frombuffer(memory)), setup.mounting
-
-    def publish(controller: Controller) -> None:
-        """Tell the table where the paddle is."""
-        arm = controller.arm
-        place = mounting.to_table(pose_vector(arm.pose))
-        velocity = mounting.rotate_to_table(arm.twist[:3])
-        block.write((time.monotonic(), *place, *velocity[:2]))
-
-    controller = Controller(setup.make_arm(), publish)
-    arm = controller.arm
+    table = PublishedTable(setup, Block(np.frombuffer(memory)))
+    controller = Controller(setup.make_arm(table))
+    arm, served = controller.arm, Ports(controller)
 
     def guide(place: list[float]) -> None:
         """Move as somebody guides the arm by hand."""
-        arm.motion = Line(mounting.pose(np.array(place)), 0.25, 1.0)
+        arm.motion = Line(setup.mounting.pose(np.array(place)), 0.25, 1.0)
 
     orders: dict[str, Callable[[Any], None]] = {
         "guide": guide,
@@ -57,11 +72,11 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
             orders[name](value)
             pipe.send({"stopped": arm.stopped, "safety": arm.safety.name})
 
-        ports = asyncio.create_task(controller.serve())
+        ports = asyncio.create_task(served.serve())
         while not ports.done() and not controller.ticks:
             await asyncio.sleep(0.01)
         if not ports.done():
-            pipe.send({"host": controller.host})
+            pipe.send({"host": served.host})
         asyncio.get_running_loop().add_reader(pipe.fileno(), obey)
         waiting = asyncio.create_task(ended.wait())
         await asyncio.wait({ports, waiting}, return_when=asyncio.FIRST_COMPLETED)

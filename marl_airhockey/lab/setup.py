@@ -11,7 +11,8 @@ from marl_airhockey.core.seat import Seat, make_seat
 from marl_airhockey.core.table import TABLES, Table
 from marl_airhockey.devices.robot.kinematics import inverse, pose_of, vector_of
 from marl_airhockey.devices.robot.mounting import Mounting
-from marl_airhockey.lab.ur_controller.arm import Arm, Surface
+from marl_airhockey.lab.ur_controller.arm import Arm
+from marl_airhockey.lab.ur_controller.plant import EmptyTable, Plant
 from marl_airhockey.types import Array
 
 BEHIND = 0.22
@@ -66,13 +67,20 @@ class LabSetup:
         foot = np.column_stack([rotation[:, 0], -rotation[:, 1], -rotation[:, 2]])
         return Mounting.of(origin, rotation, vector_of(foot))
 
-    def make_arm(self) -> Arm:
-        """Return the arm with its paddle above its home place."""
+    def make_table(self) -> EmptyTable:
+        """Return the table under the paddle, as a plant."""
+        normal = np.array(self.mounting.rotation)[:, 2]
+        return EmptyTable(np.array(self.mounting.origin), normal)
+
+    def make_arm(self, plant: Plant | None = None) -> Arm:
+        """Return the arm with its paddle above its home position.
+
+        Args:
+            plant: What the paddle touches; None for an empty table.
+        """
         pose = pose_of(self.mounting.pose(self.home, LIFT))
         flange = pose @ np.linalg.inv(pose_of(np.array(TOOL)))
         found, angles = inverse(flange, np.array(ELBOW_UP), 200)
         if not found:
             raise ValueError(f"the arm does not reach {self.home} m on {self.table}")
-        origin = np.array(self.mounting.origin)
-        normal = np.array(self.mounting.rotation)[:, 2]
-        return Arm(angles, np.array(TOOL), Surface(origin, normal))
+        return Arm(angles, np.array(TOOL), plant or self.make_table())

@@ -53,13 +53,17 @@ class JointLimits(NamedTuple):
     """(6,) rad, now"""
 
 
-def read_limits(host: str) -> JointLimits:
+def read_limits(host: str, port: int = STATE_PORT) -> JointLimits:
     """Read the limits of an arm from its controller.
+
+    Args:
+        host: Address of the controller.
+        port: Port that sends its state.
 
     Raises:
         OSError: no controller answers, or it tells no limits.
     """
-    with socket.create_connection((host, STATE_PORT), ANSWER) as link:
+    with socket.create_connection((host, port), ANSWER) as link:
         link.settimeout(ANSWER)
         file = link.makefile("rb")
         # The first message is the version, and not each state has all packages.

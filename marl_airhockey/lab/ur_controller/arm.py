@@ -15,6 +15,17 @@ from marl_airhockey.devices.robot.kinematics import (
     pose_of,
     pose_vector,
 )
+from marl_airhockey.lab.ur_controller.motions import (
+    Force,
+    Halt,
+    JointLine,
+    JointSpeed,
+    Line,
+    Motion,
+    Servo,
+    Speed,
+)
+from marl_airhockey.lab.ur_controller.plant import Plant
 from marl_airhockey.types import Array
 
 DT = 0.002
@@ -25,12 +36,12 @@ JOINT_SPEED = np.pi
 """Largest speed of a joint, rad/s: the maker's 180 degrees a second"""
 JOINT_ACCELERATION = 25.0
 """Largest acceleration of a joint that the model's drives give, rad/s2"""
-STOP_DECELERATION = 20.0
-"""Deceleration of the fastest joint in a protective or emergency stop, rad/s2"""
 DEVIATION = 0.5
-"""Distance of a joint from where it is told to be that is a fault, rad"""
-STIFFNESS = 2e4
-"""Stiffness of the surface under a paddle that is pressed on it, N/m"""
+"""Distance of a joint from its target that is a fault, rad"""
+FORCE_LIMIT = 150.0
+"""Force on the tool beyond which the arm stops, N"""
+FORCE_DAMPING = 100.0
+"""Force error for each m/s of the compliant axis, Ns/m"""
 
 
 class Safety(IntEnum):
@@ -50,70 +61,6 @@ SAFETY_BITS = {
 
 
 @dataclass
-class Servo:
-    """Motion toward a pose, as `servoL` commands it."""
-
-    pose: Array
-    """(6,) of the tool: m and rotation vector"""
-    half_rise: float
-    """Time to half of a step, s"""
-
-
-@dataclass
-class Speed:
-    """Motion at a velocity that never ends by itself, as `speedL` commands it."""
-
-    twist: Array
-    """(6,) m/s and rad/s"""
-    acceleration: float
-    """m/s2"""
-
-
-@dataclass
-class Line:
-    """Straight way to a pose, as `moveL` commands it."""
-
-    pose: Array
-    """(6,)"""
-    speed: float
-    """m/s"""
-    acceleration: float
-    """m/s2"""
-
-
-@dataclass
-class Halt:
-    """Braking to rest."""
-
-    deceleration: float = STOP_DECELERATION
-    """Of the fastest joint, rad/s2"""
-
-
-@dataclass
-class Force:
-    """Compliance along the z axis of a frame."""
-
-    frame: Array
-    """(6,) pose"""
-    newtons: float
-    """Wanted force along it"""
-    speed: float
-    """Largest speed along it, m/s"""
-
-
-@dataclass
-class Surface:
-    """Plane that a paddle rests on, in the base frame."""
-
-    origin: Array
-    """(3,) m"""
-    normal: Array
-    """(3,) upward"""
-    raised: float = 0.0
-    """Height of what lies under the paddle, m"""
-
-
-@dataclass
 class Arm:
     """Arm of six joints, moved by a step of `DT`.
 
@@ -125,33 +72,36 @@ class Arm:
     """(6,) rad, at the start"""
     tool: Array
     """(6,) pose of the tool's centre in the flange's frame"""
-    surface: Surface
+    plant: Plant
+    """What the tool touches"""
     tool_speed: float = 1.5
     """Speed of the tool's centre beyond which the arm stops, m/s"""
-    motion: Servo | Speed | Line | Halt = field(default_factory=Halt)
+    motion: Motion = field(default_factory=Halt)
     force: Force | None = None
     safety: Safety = Safety.NORMAL
     stopped: str = ""
     """Cause of the last stop"""
+    speed_fraction: float = 1.0
+    """Speed slider: fraction of every programmed speed"""
 
     def __post_init__(self) -> None:
         self.speeds = np.zeros(6)
         self.rates = np.zeros(6)
-        self.aim = self.angles.copy()
-        """Angles that the motion wants"""
-        self.contact = 0.0
-        """Force of the surface on the tool, N"""
+        self.target = self.angles.copy()
+        """(6,) joint angles that the motion aims at"""
         self.payload = 0.0
+        self._force_zero = np.zeros(6)
+        self._height = 0.0
         self.mount(self.tool)
-        self._height = self._above(self.pose[:3, 3])
 
     def mount(self, tool: Array) -> None:
-        """Take the tool's centre to be at a pose (6,) in the flange's frame."""
+        """Set the tool's centre to a pose (6,) in the flange's frame."""
         self.tool, self._tool = tool, pose_of(tool)
         self._off_tool = np.linalg.inv(self._tool)
-        self._look()
+        self._update_pose()
+        self._touch()
 
-    def _look(self) -> None:
+    def _update_pose(self) -> None:
         flange, jacobian = forward(self.angles)
         self.pose = flange @ self._tool
         """(4, 4) of the tool's centre, base frame"""
@@ -162,27 +112,43 @@ class Arm:
         self.twist = jacobian @ self.speeds
         """(6,) m/s and rad/s of the tool's centre"""
 
-    def _above(self, place: Array) -> float:
-        return float((place - self.surface.origin) @ self.surface.normal)
+    def _touch(self) -> None:
+        self.reading = self.plant(pose_vector(self.pose), self.twist)
+
+    @property
+    def measured_force(self) -> Array:
+        """(6,) N and Nm, relative to when the sensor was zeroed, base frame."""
+        return np.asarray(self.reading.force - self._force_zero)
+
+    def zero_force_sensor(self) -> None:
+        """Take the present force as zero, a contact's too, as the real sensor does."""
+        self._force_zero = self.reading.force.copy()
 
     def rehearse(self) -> None:
         """Make every motion on a copy, so that all is compiled before time counts."""
+        plant, self.plant = self.plant, lambda pose, velocity: self.reading
         twin, pose = deepcopy(self), pose_vector(self.pose)
+        self.plant = plant
         twin.press(Force(pose, 1.0, 0.1))
         twin.servo(pose, 0.1)
-        for motion in (twin.motion, Speed(np.zeros(6), 1.0), Line(pose, 0.1, 1.0)):
+        for motion in (
+            *(twin.motion, Speed(np.zeros(6), 1.0), Line(pose, 0.1, 1.0)),
+            JointLine(self.angles, 0.1, 1.0),
+        ):
             twin.motion = motion
             twin.step()
 
-    def reachable(self, pose: Array) -> bool:
-        """Return True if some joint angles near these give the tool this pose (6,)."""
-        return self._solve(pose) is not None
+    def solve(self, pose: Array, near: Array | None = None) -> Array | None:
+        """Return joint angles that give the tool a pose (6,); None without any.
 
-    def _solve(self, pose: Array) -> Array | None:
+        Args:
+            pose: (6,) base frame.
+            near: (6,) angles where the search begins; None for the present target.
+        """
         if not np.isfinite(pose).all():
             return None
         flange = pose_of(pose) @ self._off_tool
-        found, angles = inverse(flange, self.aim)
+        found, angles = inverse(flange, self.target if near is None else near)
         return angles if found else None
 
     def stop(self, mode: Safety, why: str) -> None:
@@ -195,22 +161,29 @@ class Arm:
     def release(self) -> None:
         """Take motions again; the arm stands still until one comes."""
         self.safety, self.stopped = Safety.NORMAL, ""
-        self.aim, self.motion = self.angles.copy(), Halt()
+        self.target, self.motion = self.angles.copy(), Halt()
 
     def servo(self, pose: Array, half_rise: float) -> bool:
         """Follow a pose; False if there are no joint angles for it."""
-        angles = self._solve(pose)
-        if angles is None:
-            return False
-        self.motion = Servo(np.array(pose), half_rise)
-        self.aim = angles
-        return True
+        angles = self.solve(pose)
+        if angles is not None:
+            self.servo_joints(angles, half_rise)
+        return angles is not None
+
+    def servo_joints(self, angles: Array, half_rise: float) -> None:
+        """Follow joint angles (6,), rad."""
+        self.motion, self.target = Servo(angles, half_rise), angles
 
     def press(self, force: Force | None) -> None:
         """Become compliant, or stiff again (None)."""
         if force is not None and self.force is None:
-            self._height = self._above(self.pose[:3, 3])
+            self._height = self._along(force)
         self.force = force
+
+    def _along(self, force: Force) -> float:
+        """Return the position along the compliant axis, m."""
+        frame = pose_of(force.frame)
+        return float((self.pose[:3, 3] - frame[:3, 3]) @ frame[:3, 2])
 
     @property
     def at_rest(self) -> bool:
@@ -219,69 +192,78 @@ class Arm:
 
     def step(self) -> None:
         """Move by a period of the controller."""
-        motion = self.motion
-        if isinstance(motion, Halt):
-            wanted = self._braked(motion)
-        elif isinstance(motion, Servo):
-            wanted = self._served(motion)
-        else:
-            wanted = self._driven(motion)
+        goal = self._goal_speeds(self.motion)
         change = np.clip(
-            (wanted - self.speeds) / DT, -JOINT_ACCELERATION, JOINT_ACCELERATION
+            (goal - self.speeds) / DT, -JOINT_ACCELERATION, JOINT_ACCELERATION
         )
         self.rates, self.speeds = change, self.speeds + change * DT
         self.angles = self.angles + self.speeds * DT
-        self._look()
+        self._update_pose()
         if self.force is not None:
             self._comply(self.force)
+        self._touch()
         self._watch()
 
-    def _braked(self, motion: Halt) -> Array:
-        fastest = np.abs(self.speeds).max()
-        left = max(fastest - motion.deceleration * DT, 0.0)
-        self.contact = 0.0
-        return np.asarray(self.speeds * (left / fastest if fastest else 0.0))
+    def _goal_speeds(self, motion: Motion) -> Array:
+        """Return the joint speeds (6,) that a motion calls for now, rad/s."""
+        if isinstance(motion, Halt):
+            fastest = np.abs(self.speeds).max()
+            left = max(fastest - motion.deceleration * DT, 0.0)
+            return np.asarray(self.speeds * (left / fastest if fastest else 0.0))
+        if isinstance(motion, Servo):
+            # A slower clock of the program is a slower lag.
+            rate = HALF_RISE / motion.half_rise * self.speed_fraction
+            pull = rate * rate * (self.target - self.angles) - 2 * rate * self.speeds
+            return np.asarray(self.speeds + pull * DT)
+        if isinstance(motion, JointSpeed):
+            change = self.speed_fraction * motion.speeds - self.speeds
+            most = motion.acceleration * DT
+            return np.asarray(self.speeds + np.clip(change, -most, most))
+        if isinstance(motion, JointLine):
+            return self._joint_line(motion)
+        return self._tool_speeds(motion)
 
-    def _served(self, motion: Servo) -> Array:
-        rate = HALF_RISE / motion.half_rise
-        pull = rate * rate * (self.aim - self.angles) - 2 * rate * self.speeds
-        return np.asarray(self.speeds + pull * DT)
+    def _joint_line(self, motion: JointLine) -> Array:
+        way = motion.angles - self.angles
+        left = float(np.abs(way).max())
+        if left < 1e-4 and self.at_rest:
+            self.motion = Halt()
+        ease = float(np.sqrt(motion.acceleration * left))
+        top = min(motion.speed * self.speed_fraction, ease, 8.0 * left)
+        change = way / max(left, 1e-9) * top - self.speeds
+        most = 2.0 * motion.acceleration * DT
+        return np.asarray(self.speeds + np.clip(change, -most, most))
 
-    def _comply(self, force: Force) -> None:
-        """Move the tool to the height at which the wanted force is felt.
-
-        The force's own loop is taken as ideal: it is as fast as it may be.
-        """
-        under = self.surface.raised - self._height
-        self.contact = STIFFNESS * max(under, 0.0)
-        wanted = self.surface.raised - abs(force.newtons) / STIFFNESS
-        most = force.speed * DT
-        self._height += float(np.clip(wanted - self._height, -most, most))
-        way = np.zeros(6)
-        off = self._height - self._above(self.pose[:3, 3])
-        way[:3] = off * self.surface.normal
-        self.angles = self.angles + joint_speeds(self._jacobian, way)
-        self._look()
-
-    def _driven(self, motion: Speed | Line) -> Array:
+    def _tool_speeds(self, motion: Speed | Line) -> Array:
         if isinstance(motion, Speed):
-            wanted, most = motion.twist, motion.acceleration
+            goal, most = self.speed_fraction * motion.twist, motion.acceleration
         else:
             way = motion.pose[:3] - self.pose[:3, 3]
             left = float(np.linalg.norm(way))
             if left < 1e-4 and self.at_rest:
                 self.motion = Halt()
             ease = float(np.sqrt(motion.acceleration * left))
-            top = min(motion.speed, ease, 8.0 * left)
-            wanted, most = np.zeros(6), 2.0 * motion.acceleration
-            wanted[:3] = way / max(left, 1e-9) * top
-            goal, here = pose_of(motion.pose)[:3, :3], self.pose[:3, :3]
-            rotated = goal @ here.T
-            wanted[3:] = 4.0 * pose_vector(_rotation(rotated))[3:]
-        change = wanted - self.twist
+            top = min(motion.speed * self.speed_fraction, ease, 8.0 * left)
+            goal, most = np.zeros(6), 2.0 * motion.acceleration
+            goal[:3] = way / max(left, 1e-9) * top
+            rotated = np.eye(4)
+            rotated[:3, :3] = pose_of(motion.pose)[:3, :3] @ self.pose[:3, :3].T
+            goal[3:] = 4.0 * pose_vector(rotated)[3:]
+        change = goal - self.twist
         size = float(np.linalg.norm(change[:3]))
         fit = min(1.0, most * DT / size) if size else 1.0
         return np.asarray(joint_speeds(self._jacobian, self.twist + fit * change))
+
+    def _comply(self, force: Force) -> None:
+        """Move the tool along the compliant axis, as fast as the force error says."""
+        axis = pose_of(force.frame)[:3, 2]
+        error = self.measured_force[:3] @ axis + force.newtons
+        speed = float(np.clip(error / FORCE_DAMPING, -force.speed, force.speed))
+        self._height += speed * DT
+        twist = np.zeros(6)
+        twist[:3] = (self._height - self._along(force)) * axis
+        self.angles = self.angles + joint_speeds(self._jacobian, twist)
+        self._update_pose()
 
     def _watch(self) -> None:
         """Stop for safety where joints or tool exceed what they may."""
@@ -291,16 +273,12 @@ class Arm:
             self.stop(Safety.PROTECTIVE_STOP, "joint speed")
         elif np.linalg.norm(self.twist[:3]) > self.tool_speed:
             self.stop(Safety.PROTECTIVE_STOP, "tool speed")
+        elif np.linalg.norm(self.reading.force[:3]) > FORCE_LIMIT:
+            self.stop(Safety.PROTECTIVE_STOP, "force")
         elif (
             isinstance(self.motion, Servo)
-            and np.abs(self.aim - self.angles).max() > DEVIATION
+            and np.abs(self.target - self.angles).max() > DEVIATION
         ):
             self.stop(Safety.PROTECTIVE_STOP, "position deviates from its command")
-        if self.safety is Safety.NORMAL and isinstance(self.motion, Halt):
-            self.aim = self.angles.copy()
-
-
-def _rotation(matrix: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3] = matrix
-    return pose
+        if self.safety is Safety.NORMAL and not isinstance(self.motion, Servo):
+            self.target = self.angles.copy()

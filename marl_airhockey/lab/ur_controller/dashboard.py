@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from marl_airhockey.lab.ur_controller.arm import Safety
-
-if TYPE_CHECKING:
-    from marl_airhockey.lab.ur_controller.server import Controller
+from marl_airhockey.lab.ur_controller.controller import Controller
 
 GREETING = "Connected: Universal Robots Dashboard Server"
-UNLOCK_AFTER = 5.0
-"""Time that a protective stop lasts at least, s, as the real dashboard says"""
 LOCKED = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of "
     "protective stop before unlocking"
@@ -25,51 +18,56 @@ class Dashboard:
     """Dashboard of a controller.
 
     Args:
-        controller: what it looks after.
+        controller: Controller that it looks after.
+        play: Function that starts the program at the pendant: External Control.
     """
 
-    def __init__(self, controller: Controller) -> None:
-        self._controller = controller
-        self._since = 0.0
+    def __init__(self, controller: Controller, play: Callable[[], None]) -> None:
+        self._controller, self._start = controller, play
         self._replies: dict[str, Callable[[], str]] = {
-            "PolyscopeVersion": lambda: "URSoftware 5.12.2.1101534 (Jan 01 2024)",
+            "PolyscopeVersion": self._version,
             "get serial number": lambda: "20200000000",
-            "is in remote control": lambda: "true",
+            "is in remote control": lambda: str(controller.remote).lower(),
             "get robot model": lambda: "UR5",
-            "robotmode": lambda: "Robotmode: RUNNING",
-            "safetystatus": lambda: f"Safetystatus: {self._safety}",
-            "safetymode": lambda: f"Safetymode: {self._safety}",
+            "robotmode": self._mode,
+            "safetystatus": lambda: f"Safetystatus: {controller.arm.safety.name}",
+            "safetymode": lambda: f"Safetymode: {controller.arm.safety.name}",
             "close safety popup": lambda: "closing safety popup",
             "unlock protective stop": self._unlock,
             "stop": self._stop,
-            "play": lambda: "Starting program",
+            "play": self._play,
             "running": lambda: f"Program running: {str(self._running).lower()}",
             "programState": lambda: (
                 f"{'PLAYING' if self._running else 'STOPPED'} rtde_control"
             ),
-            "power on": lambda: "Powering on",
-            "brake release": lambda: "Brake releasing",
+            "power on": lambda: self._power(True, "Powering on"),
+            "power off": lambda: self._power(False, "Powering off"),
+            "brake release": lambda: self._power(True, "Brake releasing"),
         }
-
-    @property
-    def _safety(self) -> str:
-        return self._controller.arm.safety.name
 
     @property
     def _running(self) -> bool:
         return self._controller.script.running
 
-    def note_stop(self) -> None:
-        """Count the time of a protective stop from now on."""
-        self._since = time.monotonic()
+    def _version(self) -> str:
+        version = ".".join(str(part) for part in self._controller.version)
+        return f"URSoftware {version} (Jan 01 2024)"
+
+    def _mode(self) -> str:
+        return f"Robotmode: {'RUNNING' if self._controller.powered else 'POWER_OFF'}"
+
+    def _power(self, on: bool, reply: str) -> str:
+        self._controller.switch_power(on)
+        return reply
 
     def _unlock(self) -> str:
-        arm = self._controller.arm
-        if arm.safety is Safety.PROTECTIVE_STOP:
-            if time.monotonic() - self._since < UNLOCK_AFTER:
-                return LOCKED
-            arm.release()
-        return "Protective stop releasing"
+        return "Protective stop releasing" if self._controller.unlock() else LOCKED
+
+    def _play(self) -> str:
+        if not self._controller.ready:
+            return "Failed to execute: play"
+        self._start()
+        return "Starting program"
 
     def _stop(self) -> str:
         self._controller.script.kill()

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.jit.cache import cache_folder
 from marl_airhockey.lab.door import open_door
+from marl_airhockey.lab.ur_controller.controller import VERSION, Controller
 from marl_airhockey.lab.ur_controller.faults import FAULTS
-from marl_airhockey.lab.ur_controller.server import Controller
+from marl_airhockey.lab.ur_controller.ports import Ports
 
 SCHEDULED = re.compile(r"(\w+)@([\d.]+)s?(?:-([\d.]+)s?)?")
 """Form of a scheduled fault: NAME@BEGIN or NAME@BEGIN-END, s"""
@@ -43,6 +44,18 @@ class ScheduledFault(NamedTuple):
         if end is not None and float(end) <= float(begin):
             raise ValueError(f"fault {text!r}: it must end after it begins")
         return ScheduledFault(name, float(begin), float(end) if end else None)
+
+
+def parse_version(text: str) -> tuple[int, int, int, int]:
+    """Return the version of a text such as ``5.12.2``, with the emulated build.
+
+    Raises:
+        ValueError: Another form.
+    """
+    if not re.fullmatch(r"\d+\.\d+\.\d+", text):
+        raise ValueError(f"--polyscope: {text!r}; expected a version such as 5.12.2")
+    major, minor, bugfix = (int(part) for part in text.split("."))
+    return major, minor, bugfix, VERSION[3]
 
 
 def door_file(address: str) -> Path:
@@ -90,7 +103,7 @@ async def serve_emulator(
     waiting = [asyncio.create_task(follow(fault)) for fault in schedule]
     try:
         with open_door(answer, door_file(address)):
-            await controller.serve([address])
+            await Ports(controller).serve([address])
     finally:
         for task in waiting:
             task.cancel()

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from marl_airhockey.lab.ur_controller.arm import Safety
-from marl_airhockey.lab.ur_controller.server import Controller
+from marl_airhockey.lab.ur_controller.controller import Controller
+from marl_airhockey.lab.ur_controller.plant import EmptyTable
 
 RAISED = 0.006
 """Height of the body under the paddle, m"""
@@ -14,30 +15,30 @@ DELAY = 0.1
 """Delay of delayed packets, s"""
 STALL = 0.08
 """Time for which a controller without real time does nothing, twice a second, s"""
+SLOW = 0.1
+"""Fraction to which somebody turns the speed slider"""
 
 
 class Fault(NamedTuple):
     """Fault."""
 
     what: str
-    """Description of what happens."""
+    """Description of what happens"""
     switch: Callable[[Controller, bool], None]
     """Function that switches it on or off"""
 
 
 def _protective_stop(controller: Controller, on: bool) -> None:
-    arm = controller.arm
     if on:
-        arm.stop(Safety.PROTECTIVE_STOP, "fault")
-        controller.dashboard.note_stop()
-    elif arm.safety is Safety.PROTECTIVE_STOP:
+        controller.stop(Safety.PROTECTIVE_STOP, "fault")
+    elif controller.arm.safety is Safety.PROTECTIVE_STOP:
         # As if a person at the pendant had unlocked it.
-        arm.release()
+        controller.arm.release()
 
 
 def _emergency_stop(controller: Controller, on: bool) -> None:
     if on:
-        controller.arm.stop(Safety.ROBOT_EMERGENCY_STOP, "fault")
+        controller.stop(Safety.ROBOT_EMERGENCY_STOP, "fault")
     elif controller.arm.safety is Safety.ROBOT_EMERGENCY_STOP:
         controller.arm.release()
 
@@ -51,7 +52,7 @@ def _delayed(controller: Controller, on: bool) -> None:
 
 
 def _dropped(controller: Controller, on: bool) -> None:
-    controller.refuse(on)
+    controller.refuses = on
 
 
 def _stalled(controller: Controller, on: bool) -> None:
@@ -59,7 +60,22 @@ def _stalled(controller: Controller, on: bool) -> None:
 
 
 def _raised(controller: Controller, on: bool) -> None:
-    controller.arm.surface.raised = RAISED if on else 0.0
+    plant = controller.arm.plant
+    if not isinstance(plant, EmptyTable):
+        raise ValueError("puck_under_paddle: this plant has no table to put one on")
+    plant.raised = RAISED if on else 0.0
+
+
+def _slowed(controller: Controller, on: bool) -> None:
+    controller.arm.speed_fraction = SLOW if on else 1.0
+
+
+def _local(controller: Controller, on: bool) -> None:
+    controller.remote = not on
+
+
+def _powered_off(controller: Controller, on: bool) -> None:
+    controller.switch_power(not on)
 
 
 FAULTS = {
@@ -70,5 +86,8 @@ FAULTS = {
     "dropped_connection": Fault("RTDE connections are closed, and refused", _dropped),
     "loss_of_real_time": Fault("the controller stalls for 80 ms twice a s", _stalled),
     "puck_under_paddle": Fault("the paddle is lifted by 6 mm", _raised),
+    "speed_slider": Fault("somebody turns the speed slider to 10 %", _slowed),
+    "local_control": Fault("the pendant is switched to local control", _local),
+    "power_off": Fault("the arm has no power; its brakes hold it", _powered_off),
 }
 """Faults by name"""

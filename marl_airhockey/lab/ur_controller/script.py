@@ -12,13 +12,15 @@ from collections.abc import Callable, Generator
 
 import numpy as np
 
-from marl_airhockey.lab.ur_controller.arm import (
-    DT,
-    Arm,
+from marl_airhockey.devices.robot.kinematics import forward, pose_of, pose_vector
+from marl_airhockey.lab.ur_controller.arm import DT, Arm, Safety
+from marl_airhockey.lab.ur_controller.motions import (
     Force,
     Halt,
+    JointLine,
+    JointSpeed,
     Line,
-    Safety,
+    Motion,
     Speed,
 )
 from marl_airhockey.types import Array
@@ -31,13 +33,14 @@ DEAD_TIME = 0.004
 """Part of the half-rise of `servoL` that no look-ahead explains: of 34 ms at a
 look-ahead of 0.03 s on the arm's relatives, s"""
 Waiting = Generator[None, None, None]
+"""Command that takes several periods"""
 
 
 class ControlScript:
     """Script of a client that runs on the controller.
 
     Args:
-        arm: what it moves.
+        arm: Arm that it moves.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -50,28 +53,42 @@ class ControlScript:
         """Time since the last write of a command's number, s, in periods of the
         controller: a real one is always served, and what this one sleeps through is no
         silence of its client's."""
+        self.offset = 0
+        """First of the registers that the script uses: 0, or 24 for the upper range."""
         self._run: Waiting | None = None
         self._watchdog = 0.0
         """Least rate of commands, Hz; 0 without a watchdog"""
+        # Commands that are not acknowledged.
         self._real_time: dict[int, Callable[[], None]] = {
-            6: self._force,
-            10: self._speed,
-            24: self._servo,
+            6: self._force_mode,
+            9: self._speed_joints,
+            10: self._speed_tool,
+            11: self._servo_joints,
+            24: self._servo_tool,
+            27: self._report_joints,
         }
-        """Commands that are not acknowledged"""
         self._regular: dict[int, Callable[[], Waiting | None]] = {
-            3: self._line,
-            7: self._stiffen,
-            8: _nothing,
+            1: self._move_joints,
+            2: self._move_joints_to_pose,
+            3: self._move_line,
+            7: self._end_force_mode,
+            8: self.arm.zero_force_sensor,
             15: self._halt,
             16: self._halt,
-            17: self._load,
-            29: self._tool,
-            31: self._protect,
+            17: self._set_payload,
+            29: self._set_tool,
+            30: self._solve_near,
+            31: self._stop_protectively,
             33: self._halt,
             34: self._halt,
-            35: self._guard,
-            36: self._safe,
+            35: self._set_watchdog,
+            36: self._check_pose,
+            40: self._report_tool,
+            43: self._report_pose,
+            44: self._report_pose_of,
+            46: self._solve,
+            47: self._check_steady,
+            60: self._check_pose,
         }
 
     @property
@@ -79,19 +96,24 @@ class ControlScript:
         """True while the script runs."""
         return self._run is not None
 
-    def start(self) -> None:
-        """Run the script that was uploaded."""
+    def start(self, offset: int = 0) -> None:
+        """Run the script that was uploaded.
+
+        Args:
+            offset: First of its registers.
+        """
+        self.offset = offset
         self._run, self._watchdog = self._loop(), 0.0
 
     def kill(self) -> None:
         """End the script; the arm brakes. Its registers keep what they hold."""
         if self.running:
             self._run, self._watchdog = None, 0.0
-            self.outputs_int[0] = 0
+            self._reply(0)
             self.arm.motion, self.arm.force = Halt(), None
 
     def step(self) -> None:
-        """Go on by a period of the controller."""
+        """Run for a period of the controller."""
         self.silence += DT
         if self._watchdog and self.silence > 1.0 / self._watchdog:
             self.kill()
@@ -102,16 +124,18 @@ class ControlScript:
                 self.kill()
 
     def _loop(self) -> Waiting:
-        self.outputs_int[0], self.outputs_int[2] = READY, 1 << 16
+        self._reply(READY)
+        self._reply(1 << 16, 2)
         executed = False
         while self.running:
-            command = self.inputs_int[0]
+            command = self.inputs_int[self.offset]
             if command in self._real_time:
                 self.counts[command] += 1
                 self._real_time[command]()
-                self.outputs_int[0] = READY
+                self._reply(READY)
             elif command == 0:
-                executed, self.outputs_int[0] = False, READY
+                executed = False
+                self._reply(READY)
             elif not executed:
                 executed = True
                 self.counts[command] += 1
@@ -120,54 +144,117 @@ class ControlScript:
                 run = self._regular.get(command, _nothing)()
                 if run is not None:
                     yield from run
-                self.outputs_int[0] = DONE
+                self._reply(DONE)
             yield
 
-    def _pose(self) -> Array:
-        return self.inputs_double[:6].copy()
+    def _reply(self, value: int, register: int = 0) -> None:
+        self.outputs_int[self.offset + register] = value
 
-    def _servo(self) -> None:
-        half_rise = float(self.inputs_double[9]) + DEAD_TIME
-        if not self.arm.servo(self._pose(), half_rise):
+    def _six(self, first: int = 0) -> Array:
+        first += self.offset
+        return self.inputs_double[first : first + 6].copy()
+
+    def _number(self, index: int) -> float:
+        return float(self.inputs_double[self.offset + index])
+
+    def _servo_tool(self) -> None:
+        if not self.arm.servo(self._six(), self._number(9) + DEAD_TIME):
             # get_inverse_kin raises and ends the script; the client is not told.
             self.kill()
 
-    def _speed(self) -> None:
-        self.arm.motion = Speed(self._pose(), float(self.inputs_double[6]))
+    def _servo_joints(self) -> None:
+        if np.isfinite(self._six()).all():
+            self.arm.servo_joints(self._six(), self._number(9) + DEAD_TIME)
+        else:
+            self.kill()
 
-    def _force(self) -> None:
-        d, wanted = self.inputs_double, bool(self.inputs_int[4])
-        force = Force(self._pose(), float(d[8]), float(d[14]))
-        self.arm.press(force if wanted else None)
+    def _speed_tool(self) -> None:
+        self.arm.motion = Speed(self._six(), self._number(6))
 
-    def _stiffen(self) -> None:
+    def _speed_joints(self) -> None:
+        self.arm.motion = JointSpeed(self._six(), self._number(6))
+
+    def _force_mode(self) -> None:
+        force = Force(self._six(), self._number(8), self._number(14))
+        self.arm.press(force if self.inputs_int[self.offset + 4] else None)
+
+    def _end_force_mode(self) -> None:
         self.arm.press(None)
 
-    def _line(self) -> Waiting:
-        d = self.inputs_double
-        self.arm.motion = Line(self._pose(), float(d[6]), float(d[7]))
-        while isinstance(self.arm.motion, Line):
+    def _until_done(self, motion: Motion) -> Waiting:
+        self.arm.motion = motion
+        while self.arm.motion is motion:
             yield
 
+    def _move_line(self) -> Waiting | None:
+        if self.arm.solve(self._six()) is None:
+            self.kill()
+            return None
+        line = Line(self._six(), self._number(6), self._number(7))
+        return self._until_done(line)
+
+    def _move_joints(self) -> Waiting:
+        line = JointLine(self._six(), self._number(6), self._number(7))
+        return self._until_done(line)
+
+    def _move_joints_to_pose(self) -> Waiting | None:
+        angles = self.arm.solve(self._six())
+        if angles is None:
+            self.kill()
+            return None
+        line = JointLine(angles, self._number(6), self._number(7))
+        return self._until_done(line)
+
     def _halt(self) -> Waiting:
-        self.arm.motion = Halt(max(float(self.inputs_double[0]), 0.1))
+        self.arm.motion = Halt(max(self._number(0), 0.1))
         while not self.arm.at_rest:
             yield
 
-    def _tool(self) -> None:
-        self.arm.mount(self._pose())
+    def _set_tool(self) -> None:
+        self.arm.mount(self._six())
 
-    def _load(self) -> None:
-        self.arm.payload = float(self.inputs_double[0])
+    def _set_payload(self) -> None:
+        self.arm.payload = self._number(0)
 
-    def _protect(self) -> None:
-        self.arm.stop(Safety.PROTECTIVE_STOP, "asked for by the script")
+    def _set_watchdog(self) -> None:
+        self._watchdog, self.silence = self._number(0), 0.0
 
-    def _guard(self) -> None:
-        self._watchdog, self.silence = float(self.inputs_double[0]), 0.0
+    def _stop_protectively(self) -> None:
+        self.arm.stop(Safety.PROTECTIVE_STOP, "requested by the script")
 
-    def _safe(self) -> None:
-        self.outputs_int[1] = int(self.arm.reachable(self._pose()))
+    def _report(self, six: Array) -> None:
+        self.outputs_double[self.offset : self.offset + 6] = six
+
+    def _report_joints(self) -> None:
+        self._report(self.arm.angles)
+
+    def _report_tool(self) -> None:
+        self._report(self.arm.tool)
+
+    def _report_pose(self) -> None:
+        self._report(pose_vector(self.arm.pose))
+
+    def _report_pose_of(self) -> None:
+        flange, _ = forward(self._six())
+        self._report(pose_vector(flange @ pose_of(self._six(6))))
+
+    def _solve(self) -> None:
+        self._report_solution(self.arm.solve(self._six()))
+
+    def _solve_near(self) -> None:
+        self._report_solution(self.arm.solve(self._six(), self._six(6)))
+
+    def _report_solution(self, angles: Array | None) -> None:
+        if angles is None:
+            self.kill()
+        else:
+            self._report(angles)
+
+    def _check_pose(self) -> None:
+        self._reply(int(self.arm.solve(self._six()) is not None), 1)
+
+    def _check_steady(self) -> None:
+        self._reply(int(self.arm.at_rest), 1)
 
 
 def _nothing() -> None:

@@ -31,7 +31,7 @@ def state_of(arm: Arm) -> bytes:
     """Return the message of an arm: its joints and what they may."""
     joints = [
         JOINT.pack(angle, aim, speed, 0.0, 0.0, 0.0, 0.0, 253)
-        for angle, aim, speed in zip(arm.angles, arm.aim, arm.speeds, strict=True)
+        for angle, aim, speed in zip(arm.angles, arm.target, arm.speeds, strict=True)
     ]
     bounds = [-FARTHEST, FARTHEST] * JOINTS + [JOINT_SPEED, JOINT_ACCELERATION] * JOINTS
     packages = (

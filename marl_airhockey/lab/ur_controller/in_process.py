@@ -1,0 +1,162 @@
+"""Arm of a controller in this process, in emulated time.
+
+It is the client side of a controller as `devices.robot.Ur5e` is, without ports, threads
+and clocks: minutes of driving take seconds, and the same calls give the same motion.
+Time passes in `advance`, and in the calls that wait for the controller.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from marl_airhockey.devices.robot.arm import ArmFault, Reading
+from marl_airhockey.devices.robot.ur5e import (
+    COMPLIANCE,
+    GAIN,
+    LOOK_AHEAD,
+    STOP,
+    WATCHDOG,
+)
+from marl_airhockey.lab.ur_controller.arm import DT, Safety
+from marl_airhockey.lab.ur_controller.controller import PLAYING, Controller
+from marl_airhockey.lab.ur_controller.dashboard import LOCKED
+from marl_airhockey.lab.ur_controller.ports import STALL_EVERY
+from marl_airhockey.lab.ur_controller.rtde import Recipe
+from marl_airhockey.types import Array
+
+COMMAND = "input_int_register_0"
+SCRIPT = "reg_offset_int = 0"
+"""What an emulated controller recognizes a control script by"""
+FAULTS = {
+    Safety.NORMAL: ArmFault.NONE,
+    Safety.PROTECTIVE_STOP: ArmFault.PROTECTIVE_STOP,
+    Safety.ROBOT_EMERGENCY_STOP: ArmFault.EMERGENCY_STOP,
+}
+
+
+def _registers(integers: int, doubles: int) -> Recipe:
+    names = [f"input_int_register_{i}" for i in range(integers)]
+    names += [f"input_double_register_{i}" for i in range(doubles)]
+    return Recipe(names)
+
+
+SERVO, FORCE = _registers(1, 11), _registers(8, 18)
+REGULAR, NONE = _registers(1, 1), _registers(1, 0)
+"""Registers that commands write"""
+
+
+class Sample(NamedTuple):
+    """Sample of a controller's variables."""
+
+    time: float
+    """Time at which it can be read, s"""
+    values: dict[str, Any]
+
+
+class InProcessArm:
+    """Client of a controller, as a `devices.robot.Arm`.
+
+    Args:
+        controller: Controller, which nobody else steps.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self.controller = controller
+        self.now = 0.0
+        """Emulated time, s"""
+        self._stalled = 0.0
+        self._samples: deque[Sample] = deque()
+        self._values = controller.values()
+        controller.upload(SCRIPT)
+        self._set_watchdog()
+
+    def _send(self, recipe: Recipe, *numbers: float) -> None:
+        if not self.controller.refuses:
+            values = dict(zip(recipe.names, numbers, strict=True))
+            self.controller.take(recipe, recipe.pack(values))
+
+    def _command(self, number: int, argument: float = 0.0) -> None:
+        """Run a command that is acknowledged."""
+        self._send(REGULAR, number, argument)
+        self.advance(3 * DT)
+        self._send(NONE, 0)
+        self.advance(2 * DT)
+
+    def _set_watchdog(self) -> None:
+        self._command(35, WATCHDOG)
+
+    def advance(self, seconds: float) -> None:
+        """Let emulated time pass."""
+        controller = self.controller
+        for _ in range(round(seconds / DT)):
+            self.now += DT
+            if self._stalled > 0.0:
+                self._stalled -= DT
+                continue
+            controller.step()
+            if controller.stall and controller.ticks % STALL_EVERY == 0:
+                self._stalled = controller.stall
+            if not (controller.silent or controller.refuses):
+                values = controller.values()
+                self._samples.append(Sample(self.now + controller.delay, values))
+        while self._samples and self._samples[0].time <= self.now:
+            self._values = self._samples.popleft().values
+
+    def read(self) -> Reading:
+        """Return the newest reading that has arrived."""
+        values = self._values
+        return Reading(
+            values["timestamp"],
+            np.array(values["actual_TCP_pose"]),
+            np.array(values["actual_TCP_speed"]),
+            np.array(values["actual_TCP_force"]),
+            np.array(values["actual_q"]),
+            self._fault(),
+        )
+
+    def _fault(self) -> ArmFault:
+        safety = FAULTS[Safety(self._values["safety_mode"])]
+        running = self._values["runtime_state"] == PLAYING
+        if safety is ArmFault.NONE and not running:
+            return ArmFault.PROGRAM_LOST
+        return safety
+
+    def press(self, frame: Array, newtons: float) -> None:
+        """Become compliant along the z axis of a frame (6,) and press down."""
+        limits = 2.0, 2.0, COMPLIANCE, 1.0, 1.0, 1.0
+        wrench = 0.0, 0.0, -abs(newtons), 0.0, 0.0, 0.0
+        self._send(FORCE, 6, 2, 0, 0, 1, 0, 0, 0, *frame, *wrench, *limits)
+        self.advance(4 * DT)
+
+    def follow(self, pose: Array, seconds: float) -> bool:
+        """Follow a pose (6,) until the next one ``seconds`` later; False if refused."""
+        if not np.isfinite(pose).all() or self._values["runtime_state"] != PLAYING:
+            return False
+        self._send(SERVO, 24, *pose, 0.5, 0.5, seconds, LOOK_AHEAD, GAIN)
+        return True
+
+    def zero_force_sensor(self) -> None:
+        """Take the present force as zero."""
+        self._command(8)
+
+    def halt(self) -> None:
+        """Brake to rest and end compliance."""
+        self._command(16, STOP)
+        self._command(7)
+
+    def unlock(self) -> str:
+        """Release a protective stop; return "" or why that is refused."""
+        if not self.controller.unlock():
+            return LOCKED
+        self._send(NONE, 0)
+        self.advance(0.05)
+        self.controller.upload(SCRIPT)
+        self._set_watchdog()
+        return ""
+
+    def close(self) -> None:
+        """End the program."""
+        self._command(255)
