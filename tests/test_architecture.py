@@ -37,8 +37,6 @@ LONG = {
     "backends/real/backend.py": "the life of one table's devices, from start to stop",
     "contracts/scenario.py": "a contract with the methods that all scenarios share",
     "data/minari_files.py": "both directions of one file format",
-    "lab/ur_controller/arm.py": "one state machine of an emulated controller",
-    "lab/ur_controller/server.py": "one protocol of an emulated controller",
     "toolkit/observables.py": "twelve observables of some 25 lines each",
     "world/world.py": "one class, which all environments are views of",
 }

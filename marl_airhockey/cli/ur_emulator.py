@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ipaddress
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -89,14 +89,35 @@ def switch_fault(
     address: Address = ADDRESS,
 ) -> None:
     """Switch a fault of the running emulator on or off."""
-    from marl_airhockey.lab.door import DoorClient, port_in
-    from marl_airhockey.lab.ur_controller.emulator import door_file
     from marl_airhockey.lab.ur_controller.faults import FAULTS
 
     if name is None:
         for known, row in FAULTS.items():
             console.print(f"{known:18} {row.what}")
         return
+    safety = _ask(address, "fault", name=name, on=not off)["safety"]
+    console.print(f"{name}: {'off' if off else FAULTS[name].what}; safety {safety}")
+
+
+@ur_emulator.command("status")
+def show_status(address: Address = ADDRESS) -> None:
+    """Print what the running emulator does: safety, program, pose, force, commands.
+
+    Commands are counted by their numbers in the script of ur_rtde: 24 is servoL.
+    """
+    for name, value in _ask(address, "status").items():
+        console.print(f"{name:10} {value}")
+
+
+def _ask(address: str, do: str, **order: Any) -> dict[str, Any]:
+    """Return the answer of the running emulator at an address.
+
+    Raises:
+        RuntimeError: There is none.
+    """
+    from marl_airhockey.lab.door import DoorClient, port_in
+    from marl_airhockey.lab.ur_controller.emulator import door_file
+
     port = port_in(door_file(address))
     try:
         client = DoorClient(port, "ur-emulator") if port is not None else None
@@ -107,9 +128,9 @@ def switch_fault(
             f"ur-emulator: none is running at {address}; start one with airhockey "
             f"ur-emulator --address {address}"
         )
-    safety = client.ask("fault", name=name, on=not off)["safety"]
+    answer = client.ask(do, **order)
     client.close()
-    console.print(f"{name}: {'off' if off else FAULTS[name].what}; safety {safety}")
+    return answer
 
 
 def _check_loopback(address: str) -> None:

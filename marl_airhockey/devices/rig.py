@@ -10,7 +10,8 @@ import numpy as np
 
 from marl_airhockey.devices.camera import LATENCY
 from marl_airhockey.devices.rig_file import load_rig, save_rig
-from marl_airhockey.devices.robot.driver import DriverConfig
+from marl_airhockey.devices.robot.config import DriverConfig, Pendant, check_pendant
+from marl_airhockey.devices.robot.filters import Smoothing
 from marl_airhockey.devices.robot.mounting import Mounting
 from marl_airhockey.devices.robot.shaper import MotionLimits
 from marl_airhockey.devices.vision.colour import Colour
@@ -19,18 +20,6 @@ from marl_airhockey.types import Array
 
 LATEST = 0.2
 """Time until a stop begins, at most, in the stopping distance that is told, s"""
-SHARE = 0.7
-"""Largest share of the pendant's limits that motion may use"""
-
-
-@dataclass(frozen=True)
-class Pendant:
-    """Limits that are set at the robot's pendant, which software cannot change."""
-
-    speed: float = 1.5
-    """Speed of the tool, m/s"""
-    force: float = 150.0
-    """Force on the tool, N"""
 
 
 @dataclass(frozen=True)
@@ -64,8 +53,8 @@ class Rig:
     """Corners of the printed tags by number, table frame, m"""
     limits: MotionLimits = field(default_factory=MotionLimits)
     pendant: Pendant = field(default_factory=Pendant)
-    smoothing: float = 0.0
-    """Time constant by which commands are smoothed, s"""
+    smoothing: Smoothing = field(default_factory=Smoothing)
+    """Filter of the commands"""
     operator: str = "person"
     """Who puts the puck on the table: "person" or "lab:PORT" """
     paddle: Colour | None = None
@@ -74,23 +63,19 @@ class Rig:
     """Date of the calibration"""
 
     def __post_init__(self) -> None:
-        if self.limits.speed > SHARE * self.pendant.speed:
-            raise ValueError(
-                f"limits.speed: {self.limits.speed} m/s is above {SHARE:.0%} of the "
-                f"pendant's {self.pendant.speed} m/s; lower it, or have the pendant's "
-                "raised by whoever answers for the robot"
-            )
+        check_pendant(self.limits, self.pendant)
 
     def driver_config(self, reach: tuple[tuple[float, float], ...]) -> DriverConfig:
         """Return what the driver of its arm has to know, for a seat's reach."""
         return DriverConfig(
-            self.robot,
-            self.mounting,
-            reach,
-            self.limits,
-            self.tool,
-            self.payload,
-            self.smoothing,
+            host=self.robot,
+            mounting=self.mounting,
+            reach=reach,
+            limits=self.limits,
+            tool=self.tool,
+            payload=self.payload,
+            smoothing=self.smoothing,
+            pendant=self.pendant,
         )
 
     def motion_words(self, reach: tuple[tuple[float, float], ...]) -> str:
@@ -136,6 +121,13 @@ class Rig:
             raise ValueError(f"{path}: {error} is missing or wrong") from error
 
 
+def _smoothing(given: Any) -> Smoothing:
+    """Return the filter of a file; older ones hold the time of a low pass alone."""
+    if isinstance(given, dict):
+        return Smoothing(**given)
+    return Smoothing("low_pass", float(given)) if given else Smoothing()
+
+
 def _rig(given: dict[str, Any]) -> Rig:
     mounting = dict(given["mounting"])
     rotation = tuple(tuple(row) for row in mounting["rotation"])
@@ -145,6 +137,7 @@ def _rig(given: dict[str, Any]) -> Rig:
     parts["tool"] = tuple(parts["tool"])
     parts["limits"] = MotionLimits(**parts["limits"])
     parts["pendant"] = Pendant(**parts["pendant"])
+    parts["smoothing"] = _smoothing(parts.get("smoothing", {}))
     paddle = given.get("paddle")
     return Rig(
         view=View.from_json(given["view"]),

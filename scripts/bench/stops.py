@@ -21,8 +21,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from marl_airhockey.devices.robot import Robot
-from marl_airhockey.devices.robot.driver import DriverConfig
+from marl_airhockey.devices.robot import DriverConfig, Robot, Smoothing
 from marl_airhockey.lab.lab import Lab
 from marl_airhockey.types import Array
 
@@ -41,7 +40,7 @@ def drive(robot: Robot, seconds: float) -> None:
     """Command a velocity for a while, 20 times a second."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
-        robot.command(UP, 0.05)
+        robot.send_action(UP, 0.05)
         time.sleep(0.05)
 
 
@@ -87,7 +86,8 @@ def measure(
     """
     setup = lab.setup
     config = DriverConfig(
-        *(lab.host, setup.mounting, setup.seat.reach), smoothing=smoothing
+        *(lab.host, setup.mounting, setup.seat.reach),
+        smoothing=Smoothing("low_pass", smoothing),
     )
     with Robot(config) as robot:
         while robot.state.name == "FAULT":
@@ -101,7 +101,7 @@ def measure(
 
         def go_on() -> None:
             while wanted is not None and not going.wait(0.05):
-                robot.command(wanted, 0.05)
+                robot.send_action(wanted, 0.05)
 
         thread = threading.Thread(target=go_on)
         thread.start()
@@ -109,7 +109,7 @@ def measure(
         going.set()
         thread.join()
         undo()
-        return judge(rows, since, robot.status.braked_at)
+        return judge(rows, since, robot.get_observation().braked_at)
 
 
 def main() -> None:
@@ -138,7 +138,7 @@ def main() -> None:
 
         cases: dict[str, Case] = {
             "a command to rest": (
-                *(lambda robot: robot.command(REST, 0.05), lambda: None),
+                *(lambda robot: robot.send_action(REST, 0.05), lambda: None),
                 REST,
             ),
             "commands fail to come": (lambda robot: None, lambda: None, None),

@@ -43,7 +43,7 @@ def test_needed_speeds_are_those_of_the_arm_itself():
         way = np.zeros(6)
         plane = np.array(SETUP.mounting.rotation)[:, :2]
         way[:3] = plane @ (np.cos(angle), np.sin(angle)) * 0.7
-        arm._look()
+        arm._update_pose()
         speeds = np.linalg.solve(arm._jacobian, way)
         share = max(share, np.abs(speeds).max() / np.pi)
     tight = JOINTS._replace(speed=np.full(6, np.pi * share / limits.SHARE))
@@ -75,9 +75,9 @@ def test_a_table_out_of_reach_is_named():
         ([message(20, b"")] + [message(16, message(0, b"x" * 38))] * 30, "no limits"),
     ],
 )
-def test_a_controller_that_tells_no_limits_is_named(monkeypatch, sent, words):
+def test_a_controller_that_tells_no_limits_is_named(sent, words):
     with socket.create_server(("127.0.0.1", 0)) as server:
-        monkeypatch.setattr(limits, "STATE_PORT", server.getsockname()[1])
+        port = server.getsockname()[1]
 
         def serve():
             link, _ = server.accept()
@@ -86,13 +86,13 @@ def test_a_controller_that_tells_no_limits_is_named(monkeypatch, sent, words):
 
         threading.Thread(target=serve, daemon=True).start()
         with pytest.raises(OSError, match=words):
-            limits.read_limits("127.0.0.1")
+            limits.read_limits("127.0.0.1", port)
 
 
-def test_limits_come_in_pieces(monkeypatch):
+def test_limits_come_in_pieces():
     whole = state_of(ARM)
     with socket.create_server(("127.0.0.1", 0)) as server:
-        monkeypatch.setattr(limits, "STATE_PORT", server.getsockname()[1])
+        port = server.getsockname()[1]
 
         def serve():
             link, _ = server.accept()
@@ -101,7 +101,7 @@ def test_limits_come_in_pieces(monkeypatch):
                     link.sendall(whole[k : k + 100])
 
         threading.Thread(target=serve, daemon=True).start()
-        found = limits.read_limits("127.0.0.1")
+        found = limits.read_limits("127.0.0.1", port)
     np.testing.assert_array_equal(found.angles, ARM.angles)
     np.testing.assert_array_equal(found.speed, np.full(6, np.pi))
     np.testing.assert_array_equal(found.least, -WHOLE)

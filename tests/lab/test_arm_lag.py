@@ -12,12 +12,12 @@ from marl_airhockey.core.servo import HALF
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.devices.robot import Robot
-from marl_airhockey.devices.robot.ur5e import LOOK_AHEAD
+from marl_airhockey.devices.robot.config import ServoSettings
 from marl_airhockey.lab.calibration.arm import along, chirp, find_lag, steps
 from marl_airhockey.lab.calibration.motion import Motion, lead
 from marl_airhockey.lab.ur_controller.script import DEAD_TIME
 
-HALF_RISE = LOOK_AHEAD + DEAD_TIME
+HALF_RISE = ServoSettings().look_ahead + DEAD_TIME
 """Time in which the lab's arm makes half of a step, s"""
 
 

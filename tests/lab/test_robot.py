@@ -11,8 +11,13 @@ import numpy as np
 import pytest
 
 from marl_airhockey.core.geometry import half_planes
-from marl_airhockey.devices.robot import DriverState, Fault, Robot, RobotError
-from marl_airhockey.devices.robot.driver import DriverConfig
+from marl_airhockey.devices.robot import (
+    DriverConfig,
+    DriverState,
+    Fault,
+    Robot,
+    RobotError,
+)
 
 UP = np.array([0.0, 0.5])
 
@@ -49,7 +54,7 @@ def runs(pid):
 def drive(robot, velocity=UP, times=6):
     """Ask for a velocity for some control steps."""
     for _ in range(times):
-        robot.command(velocity, 0.05)
+        robot.send_action(velocity, 0.05)
         time.sleep(0.05)
 
 
@@ -61,27 +66,27 @@ def test_wild_commands_trip_nothing(lab, robot):
     rng, places = np.random.default_rng(0), []
     for k in range(60):
         velocity = rng.uniform(-9.0, 9.0, 2)
-        robot.command(np.full(2, np.nan) if k % 7 == 3 else velocity, 0.05)
+        robot.send_action(np.full(2, np.nan) if k % 7 == 3 else velocity, 0.05)
         until = time.monotonic() + 0.05
         while time.monotonic() < until:
-            places.append(robot.status[3:5])
+            places.append(robot.get_observation()[4:6])
             time.sleep(0.005)
     assert robot.state is DriverState.RUNNING
-    assert robot.status.refused == 9
+    assert robot.get_observation().refused == 9
     normals, offsets = half_planes(lab.setup.seat.reach)
     assert (np.array(places) @ normals.T + offsets).min() > 0.0
-    assert abs(robot.status.z) < 0.001
+    assert abs(robot.get_observation().z) < 0.001
 
 
 def test_a_command_that_fails_to_come_is_braked(robot):
     drive(robot)
     last = time.monotonic()
-    assert robot.status.vy > 0.2
+    assert robot.get_observation().vy > 0.2
     assert wait_for(lambda: robot.state is DriverState.HOLD)
     assert robot.fault is Fault.COMMAND_STALE
-    assert 0.0 < robot.status.braked_at - last < 0.3
-    assert wait_for(lambda: abs(robot.status.vy) < 0.01)
-    robot.command(np.zeros(2), 0.05)
+    assert 0.0 < robot.get_observation().braked_at - last < 0.3
+    assert wait_for(lambda: abs(robot.get_observation().vy) < 0.01)
+    robot.send_action(np.zeros(2), 0.05)
     assert wait_for(lambda: robot.state is DriverState.RUNNING)
 
 
@@ -110,7 +115,7 @@ def test_an_emergency_stop_is_never_released(lab, robot, fault):
     lab.ask({"do": "fault", "name": "emergency_stop", "on": False})
     time.sleep(0.2)
     assert robot.state is DriverState.FAULT
-    robot.close()
+    robot.disconnect()
     robot.connect()
     robot.go_to(lab.setup.home)
 
@@ -134,7 +139,7 @@ def test_a_lifted_paddle_is_held_until_somebody_lets_go(lab, robot, fault):
     fault("puck_under_paddle")
 
     def held():
-        robot.command(UP, 0.05)
+        robot.send_action(UP, 0.05)
         return robot.state is DriverState.HOLD
 
     assert wait_for(held)
@@ -151,15 +156,15 @@ def test_a_driver_that_is_killed_leaves_the_arm_at_rest(lab, robot):
     drive(robot)
     os.kill(robot.pid, signal.SIGKILL)
     assert wait_for(lambda: paddle_speed(lab) < 0.01)
-    assert wait_for(lambda: not robot.alive)
+    assert wait_for(lambda: not robot.is_connected)
 
 
 def test_a_caller_that_is_killed_leaves_nothing_behind(lab, tmp_path):
     code = tmp_path / "caller.py"
     code.write_text(
         "import time, numpy as np\n"
-        "from marl_airhockey.devices.robot import Robot\n"
-        "from marl_airhockey.devices.robot.driver import DriverConfig\n"
+        "from marl_airhockey.devices.robot import DriverConfig, Robot\n"
+        "from marl_airhockey.devices.robot import DriverConfig\n"
         "from marl_airhockey.lab.setup import LabSetup\n"
         "def main():\n"
         "    setup = LabSetup()\n"
@@ -170,7 +175,7 @@ def test_a_caller_that_is_killed_leaves_nothing_behind(lab, tmp_path):
         "        k = 0\n"
         "        while True:\n"
         "            k += 1\n"
-        "            robot.command(np.array([0.0, 0.5 * (-1) ** (k // 8)]), 0.05)\n"
+        "            robot.send_action(np.array([0.0, 0.5 * (-1) ** (k // 8)]), 0.05)\n"
         "            time.sleep(0.05)\n"
         "if __name__ == '__main__':\n"
         "    main()\n"

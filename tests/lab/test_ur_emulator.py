@@ -2,13 +2,11 @@
 
 import socket
 import struct
-import subprocess
-import sys
 import time
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from emulators import ADDRESS, emulator, switch, until
 from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
@@ -20,44 +18,9 @@ rtde_control = pytest.importorskip("rtde_control")
 rtde_io = pytest.importorskip("rtde_io")
 dashboard_client = pytest.importorskip("dashboard_client")
 
-ADDRESS, OTHER = "127.0.0.28", "127.0.0.29"
+OTHER = "127.0.0.29"
 NORMAL, PROTECTIVE = 1, 4
 """Safety status bits"""
-
-
-@contextmanager
-def emulator(*words, at=ADDRESS):
-    command = [sys.executable, "-m", "marl_airhockey.cli", "ur-emulator"]
-    with subprocess.Popen(
-        [*command, "--address", at, *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    ) as started:
-        try:
-            line = started.stdout.readline()
-            while line and at not in line:
-                line = started.stdout.readline()
-            assert line, "it ended before it answered"
-            yield
-        finally:
-            started.terminate()
-
-
-def until(condition, seconds=5.0):
-    """Return True as soon as a condition holds."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.02)
-    return False
-
-
-def switch(*words):
-    result = CliRunner().invoke(app, ["ur-emulator", "fault", *words])
-    assert result.exit_code == 0, result.exception
-    return result.output
 
 
 def test_a_client_moves_the_arm_and_meets_faults_on_demand():
@@ -245,6 +208,15 @@ def test_the_state_with_the_joint_limits_is_sent(port):
     with emulator():
         limits = read_limits(ADDRESS, port)
         np.testing.assert_allclose(limits.speed, np.pi)
+
+
+def test_the_status_names_safety_program_and_commands():
+    with emulator():
+        switch("protective_stop", "--address", ADDRESS)
+        words = ["ur-emulator", "status", "--address", ADDRESS]
+        shown = CliRunner().invoke(app, words).output
+        assert "PROTECTIVE_STOP" in shown
+        assert "stopped" in shown
 
 
 def test_a_scheduled_fault_comes_and_goes():

@@ -220,11 +220,11 @@ class RealBackend(Backend):
             RobotError: it does not.
         """
         robot = self.robot
-        while robot.state is DriverState.FAULT or not robot.alive:
-            self.operator.allow(robot.fault.words)
+        while robot.state is DriverState.FAULT or not robot.is_connected:
+            self.operator.allow(robot.fault.label)
             if robot.fault is Fault.EMERGENCY_STOP:
                 # Released at the pendant, by a person, or there is no connection.
-                robot.close()
+                robot.disconnect()
                 robot.connect()
             else:
                 robot.recover()
@@ -238,7 +238,7 @@ class RealBackend(Backend):
         until, far = time.monotonic() + PLACING, float("inf")
         began = time.monotonic()
         while time.monotonic() < until:
-            self.robot.command(np.zeros(2), 0.0)
+            self.robot.send_action(np.zeros(2), 0.0)
             last = self.watcher.last
             if last is not None and last.taken > began:
                 far = float(np.linalg.norm(last.place - wanted))
@@ -257,7 +257,7 @@ class RealBackend(Backend):
         seen: list[Sighting] = []
         until = time.monotonic() + LOST
         while len(seen) < FIRST and time.monotonic() < until:
-            self.robot.command(np.zeros(2), 0.0)
+            self.robot.send_action(np.zeros(2), 0.0)
             time.sleep(0.005)
             seen += self.watcher.take()
         if len(seen) < FIRST:
@@ -270,7 +270,7 @@ class RealBackend(Backend):
     def _move(self, command: Command, before: State, after: State) -> None:
         """Send the command, wait for the end of the step and fill ``after``."""
         self._asked = command.velocity[0, 0].copy()
-        self.robot.command(self._asked, self.control_dt)
+        self.robot.send_action(self._asked, self.control_dt)
         self._due += self.control_dt
         left = self._due - time.monotonic()
         if left > 0:
@@ -291,10 +291,10 @@ class RealBackend(Backend):
     def _trouble(self, now: float) -> str:
         """Return why the episode cannot go on; "" if it can."""
         robot = self.robot
-        if not robot.alive:
+        if not robot.is_connected:
             return "robot: its driver has ended"
         if robot.state in (DriverState.FAULT, DriverState.HOLD):
-            return f"robot: {robot.fault.words}"
+            return f"robot: {robot.fault.label}"
         if self.scene.pucks and self._camera.age > BLIND:
             return self._camera.trouble
         last = self._tracker.last
@@ -305,7 +305,7 @@ class RealBackend(Backend):
     def _fill(self, state: State, now: float, since: float) -> None:
         """Fill a state with what is there now, and what happened since a moment."""
         self._moment = now
-        status = self.robot.status
+        status = self.robot.get_observation()
         state.position[0, 0] = status.x, status.y
         state.velocity[0, 0] = status.vx, status.vy
         if self.scene.pucks:
@@ -316,11 +316,15 @@ class RealBackend(Backend):
         return self._tracker.sight(self.watcher.looked_at)
 
     def telemetry(self) -> dict[str, Any]:
-        status, camera, last = self.robot.status, self._camera, self._tracker.last
+        status, camera, last = (
+            self.robot.get_observation(),
+            self._camera,
+            self._tracker.last,
+        )
         return {
             "moment": self._moment,
             "robot": self.robot.state.name,
-            "fault": self.robot.fault.words,
+            "fault": self.robot.fault.label,
             "asked": [round(float(x), 4) for x in self._asked],
             "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
             "sent_place": [round(status.sent_x, 4), round(status.sent_y, 4)],
@@ -345,13 +349,13 @@ class RealBackend(Backend):
             raise RuntimeError(self._camera.trouble or "camera: no picture yet")
         if viewpoint == "rectified":
             return self.rectifier.rectify(frame.image, width)[..., ::-1]
-        status = self.robot.status
+        status = self.robot.get_observation()
         paddle = np.array([status.x, status.y])
         puck = self._tracker.estimate
         return self._overlay.draw(frame.image, paddle, puck, marks, width)
 
     def close(self) -> None:
-        if self._robot is not None and self._robot.alive:
+        if self._robot is not None and self._robot.is_connected:
             self._robot.disable()
         self._devices.close()
         self._robot = None

@@ -1,27 +1,48 @@
 """Robots: what moves a paddle on a real table, and the limits before it.
 
 A `Robot` runs a driver in a process of its own, which sends an `Arm` a new pose 125
-times a second. It takes wanted velocities; whatever they are, what it sends stays
+times a second. It takes commanded velocities; whatever they are, what it sends stays
 within limits of speed, acceleration, jerk and reach, and comes to rest when commands
 fail to come.
 """
 
 from marl_airhockey.devices.robot.arm import Arm, ArmFault, Reading
-from marl_airhockey.devices.robot.mailbox import DriverState, Fault, Status
+from marl_airhockey.devices.robot.config import (
+    PRESETS,
+    DriverConfig,
+    Pendant,
+    Preset,
+    ServoSettings,
+)
+from marl_airhockey.devices.robot.filters import FILTERS, Smoothing
+from marl_airhockey.devices.robot.mailbox import (
+    DriverState,
+    Fault,
+    RobotObservation,
+    Transition,
+)
 from marl_airhockey.devices.robot.mounting import Mounting
 from marl_airhockey.devices.robot.robot import Robot, RobotError
 from marl_airhockey.devices.robot.shaper import MotionLimits, Shaper
 
 __all__ = [
+    "FILTERS",
+    "PRESETS",
     "Arm",
     "ArmFault",
+    "DriverConfig",
     "DriverState",
     "Fault",
     "MotionLimits",
     "Mounting",
+    "Pendant",
+    "Preset",
     "Reading",
     "Robot",
     "RobotError",
+    "RobotObservation",
+    "ServoSettings",
     "Shaper",
-    "Status",
+    "Smoothing",
+    "Transition",
 ]

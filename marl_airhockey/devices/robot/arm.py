@@ -9,16 +9,17 @@ from marl_airhockey.types import Array
 
 
 class ArmFault(IntEnum):
-    """Reason for which an arm does not follow, by itself."""
+    """Reason for which an arm does not follow, as it reports itself."""
 
     NONE = 0
     PROTECTIVE_STOP = 1
     EMERGENCY_STOP = 2
     PROGRAM_LOST = 3
+    CONNECTION_LOST = 11
 
 
 class Reading(NamedTuple):
-    """State of an arm as it was told last, base frame."""
+    """Newest reading of an arm, base frame."""
 
     stamp: float
     """Time of the robot's clock, s; one that stands still is a robot that is silent"""
@@ -34,10 +35,16 @@ class Reading(NamedTuple):
 
 
 class Arm(Protocol):
-    """Arm that follows poses of its tool; all calls return within milliseconds."""
+    """Arm that follows poses of its tool; all calls return within milliseconds.
+
+    `Ur5e` is one; an arm of another maker needs a class like it.
+    """
 
     def read(self) -> Reading:
-        """Return what the robot has told last."""
+        """Return the newest reading."""
+
+    def zero_force_sensor(self) -> None:
+        """Take the present force as zero; the tool must touch nothing."""
 
     def press(self, frame: Array, newtons: float) -> None:
         """Become compliant along the z axis of a frame (6,) and press down."""

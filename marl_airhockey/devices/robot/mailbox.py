@@ -1,4 +1,4 @@
-"""Mailbox: memory that a robot's driver shares with whoever commands it.
+"""Mailbox: memory that a robot's driver shares with its caller.
 
 Nobody waits for a lock, see `block.Block`.
 """
@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import ctypes
 import multiprocessing
+from collections.abc import Sequence
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,20 +20,19 @@ from marl_airhockey.types import Array
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 """Names of the joints, in their order"""
 TRACK = 128
-"""Number of places of the paddle that are kept"""
+"""Number of positions of the paddle that are kept"""
+LOG = 32
+"""Number of changes of the state that are kept"""
 
 
 class DriverState(IntEnum):
-    """State of a robot's driver."""
+    """State of a robot's driver, see `supervisor`."""
 
     STARTING = 0
     READY = 1
-    """At rest; commands are not taken until it is enabled"""
     RUNNING = 2
     HOLD = 3
-    """Enabled, and braked or braking, because something is missing"""
     FAULT = 4
-    """The arm does not follow; somebody has to look"""
     CLOSED = 5
 
 
@@ -48,20 +48,27 @@ class Fault(IntEnum):
     PADDLE_LIFTED = 6
     DRIVER_LATE = 7
     NOT_CONNECTED = 8
+    NOT_AT_TABLE = 9
+    DEVIATION = 10
+    CONNECTION_LOST = ArmFault.CONNECTION_LOST
 
     @property
-    def words(self) -> str:
-        """Reason in words."""
+    def label(self) -> str:
+        """Name for messages."""
         return self.name.lower().replace("_", " ")
 
 
-class Status(NamedTuple):
-    """State of a driver and its arm, table frame, m, m/s and s."""
+class RobotObservation(NamedTuple):
+    """Observation of a driver and its arm, table frame, m, m/s and s."""
 
     state: int
+    """`DriverState`"""
     fault: int
+    """`Fault`: reason of the state"""
     stamp: float
-    """Time of this status, of the monotonic clock"""
+    """Time of this observation, of the monotonic clock"""
+    robot_time: float
+    """Time of the reading, of the robot's clock"""
     x: float
     y: float
     z: float
@@ -69,19 +76,19 @@ class Status(NamedTuple):
     vx: float
     vy: float
     sent_x: float
-    """Place that the arm was sent to last"""
+    """Position that the arm was sent to last"""
     sent_y: float
     sent_vx: float
     sent_vy: float
     force: float
-    """Force on the tool along the base's z, N"""
+    """Force of the table on the paddle, along the table's normal, N"""
     base: float
+    """Angle of the first joint, rad; those of the others follow"""
     shoulder: float
     elbow: float
     wrist_1: float
     wrist_2: float
     wrist_3: float
-    """Angle of the last joint, rad, as those of the others above"""
     cycles: int
     """Number of cycles of the driver"""
     late: int
@@ -96,63 +103,78 @@ class Status(NamedTuple):
         """Angles of the six joints, rad."""
         return tuple(getattr(self, name) for name in JOINT_NAMES)
 
+    @classmethod
+    def of_fault(cls, fault: Fault) -> Self:
+        """Return the observation of a driver that has no arm, all else 0."""
+        blank = [0.0] * len(cls._fields)
+        blank[:2] = float(DriverState.FAULT), float(fault)
+        return cls._make(blank)
 
-class Wanted(NamedTuple):
-    """What the driver is asked for."""
+
+class Transition(NamedTuple):
+    """Change of a driver's state."""
+
+    time: float
+    """Time of the monotonic clock, s"""
+    state: DriverState
+    fault: Fault
+    """Reason"""
+
+
+class Request(NamedTuple):
+    """Request of a caller to the driver."""
 
     vx: float
     vy: float
     seconds: float
-    """Time in which the velocity is to be reached, and after which it goes on"""
+    """Time in which the velocity is to be reached, and after which it continues"""
     stamp: float
     """Time of the command, of the monotonic clock"""
     enabled: float
     """1 while somebody holds the driver enabled"""
     recover: float
-    """Number of recoveries that an operator has asked for"""
+    """Number of recoveries that an operator has requested"""
     closing: float
     """1 when the driver is to end"""
 
 
 class Mailbox:
-    """Mailbox between a driver and who commands it.
+    """Mailbox between a driver and its caller.
 
     Args:
-        memory: shared array, see `allocate`.
+        memory: Shared array, see `allocate`.
     """
 
     def __init__(self, memory: Any) -> None:
         numbers = np.frombuffer(memory, np.float64)
-        first = 1 + len(Wanted._fields)
-        second = first + 1 + len(Status._fields)
-        self._wanted = Block(numbers[:first])
-        self._status = Block(numbers[first:second])
-        self._track = Block(numbers[second:])
+        ends = np.cumsum([size + 1 for size in _SIZES])
+        parts = np.split(numbers, ends[:-1])
+        self._request, self._observation, self._track, self._log = map(Block, parts)
 
     @staticmethod
     def allocate() -> Any:
         """Return the memory of a mailbox, which processes can inherit."""
-        sizes = len(Wanted._fields), len(Status._fields), 3 * TRACK
         context = multiprocessing.get_context("spawn")
-        return context.Array(ctypes.c_double, sum(sizes) + len(sizes), lock=False)
+        total = sum(_SIZES) + len(_SIZES)
+        return context.Array(ctypes.c_double, total, lock=False)
 
     @property
-    def wanted(self) -> Wanted:
-        """What is asked for."""
-        return Wanted(*(float(x) for x in self._wanted.read()))
+    def request(self) -> Request:
+        """Newest request of the caller."""
+        return Request(*(float(x) for x in self._request.read()))
 
-    @wanted.setter
-    def wanted(self, wanted: Wanted) -> None:
-        self._wanted.write(tuple(wanted))
+    @request.setter
+    def request(self, request: Request) -> None:
+        self._request.write(tuple(request))
 
     @property
-    def status(self) -> Status:
-        """State of the driver."""
-        return Status(*self._status.read().tolist())
+    def observation(self) -> RobotObservation:
+        """Newest observation of the driver."""
+        return RobotObservation(*self._observation.read().tolist())
 
-    @status.setter
-    def status(self, status: Status) -> None:
-        self._status.write(tuple(status))
+    @observation.setter
+    def observation(self, observation: RobotObservation) -> None:
+        self._observation.write(tuple(observation))
 
     @property
     def track(self) -> Array:
@@ -162,3 +184,24 @@ class Mailbox:
     @track.setter
     def track(self, track: Array) -> None:
         self._track.write(track.ravel())
+
+    @property
+    def transitions(self) -> list[Transition]:
+        """Last changes of the state, the newest last."""
+        rows = self._log.read().reshape(LOG, 3)
+        rows = rows[rows[:, 0] > 0.0]
+        return [
+            Transition(time, DriverState(int(state)), Fault(int(fault)))
+            for time, state, fault in rows.tolist()
+        ]
+
+    @transitions.setter
+    def transitions(self, rows: Sequence[Transition]) -> None:
+        last = np.zeros((LOG, 3))
+        newest = rows[-LOG:]
+        last[LOG - len(newest) :] = newest
+        self._log.write(last.ravel())
+
+
+_SIZES = (len(Request._fields), len(RobotObservation._fields), 3 * TRACK, 3 * LOG)
+"""Numbers in each part of a mailbox"""

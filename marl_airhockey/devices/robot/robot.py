@@ -4,46 +4,61 @@ from __future__ import annotations
 
 import multiprocessing
 import time
+from collections.abc import Mapping
 from multiprocessing.context import SpawnProcess
 from types import TracebackType
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
-from marl_airhockey.devices.robot.driver import DriverConfig, run_driver
+from marl_airhockey.devices.robot.config import DriverConfig
+from marl_airhockey.devices.robot.driver import NEW_PROCESS, run_driver
+from marl_airhockey.devices.robot.limits import check_reach, read_limits
 from marl_airhockey.devices.robot.mailbox import (
     DriverState,
     Fault,
     Mailbox,
-    Status,
-    Wanted,
+    Request,
+    RobotObservation,
+    Transition,
 )
+from marl_airhockey.devices.robot.ur5e import check_controller
 from marl_airhockey.types import Array
 
 START = 30.0
 """Longest time until a driver has connected, s"""
 RECOVERY = 3.0
 """Longest time that a recovery takes, s"""
+SILENT = 0.3
+"""Time without news from the driver's process after which it counts as gone, s"""
 SLOW = 0.25
-"""Speed at which a paddle goes to a place, m/s"""
+"""Speed at which a paddle is moved to a position, m/s"""
 NEAR = 0.004
-"""Distance from a place that is there, m"""
+"""Distance from a position that counts as there, m"""
 EMERGENCY = "robot: emergency stop; release it at the pendant, then start again"
 
 
 class RobotError(RuntimeError):
-    """Error of a robot that does not do what it was asked for."""
+    """Error of a robot that does not do what it was commanded."""
 
 
 class Robot:
     """Robot whose driver runs in a process of its own.
 
-    It is used in a ``with`` block, which starts the driver and ends it. It moves only
-    while it is enabled, and brakes when commands fail to come.
+    Its life is that of a LeRobot device: `connect`, `get_observation`, `send_action`,
+    `disconnect`, or a ``with`` block. In addition it moves only while it is enabled,
+    and brakes when commands fail to come.
 
     Args:
-        config: of the robot.
+        config: Configuration.
     """
+
+    observation_features: ClassVar[Mapping[str, type]] = dict.fromkeys(
+        RobotObservation._fields, float
+    )
+    """Names and types of what `get_observation` returns"""
+    action_features: ClassVar[Mapping[str, type]] = {"vx": float, "vy": float}
+    """Names and types of an action: a velocity, table frame, m/s"""
 
     def __init__(self, config: DriverConfig) -> None:
         self.config = config
@@ -61,16 +76,19 @@ class Robot:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self.close()
+        self.disconnect()
 
     def connect(self) -> None:
-        """Start the driver and wait until the arm answers.
+        """Start the driver and wait until the arm answers; nothing moves.
 
         An arm in a protective stop is then in FAULT, and `recover` is for it.
 
         Raises:
-            RobotError: it does not answer, or is in an emergency stop.
+            RobotError: No arm answers, its controller cannot be used, a joint would
+                come to its limits in the reach, it is somewhere else than at the table,
+                or it is in an emergency stop.
         """
+        self._check()
         memory = Mailbox.allocate()
         self._box, self._enabled = Mailbox(memory), 0.0
         context = multiprocessing.get_context("spawn")
@@ -83,16 +101,40 @@ class Robot:
             if not self._process.is_alive():
                 break
             time.sleep(0.01)
-        state, fault = self.state, self.fault
-        if state is DriverState.READY or fault is Fault.PROTECTIVE_STOP:
+        observation, fault = self.get_observation(), self.fault
+        if self.state is DriverState.READY or fault is Fault.PROTECTIVE_STOP:
             return
-        self.close()
+        self.disconnect()
         if fault is Fault.EMERGENCY_STOP:
             raise RobotError(EMERGENCY)
+        if fault is Fault.NOT_AT_TABLE:
+            x, y, z = observation.x, observation.y, observation.z
+            raise RobotError(
+                f"robot at {self.config.host}: the tool is at x {x:+.2f}, y {y:+.2f}, "
+                f"z {z:+.2f} m of the table, away from its reach; move it there by "
+                "hand, or calibrate the mounting again"
+            )
         raise RobotError(
-            f"robot at {self.config.host}: no arm answers; is it switched on, in "
-            "remote control, and in this network?"
+            f"robot at {self.config.host}: its program did not start; does another "
+            "client control it?"
         )
+
+    def _check(self) -> None:
+        """Refuse a controller, and a reach in which joints come to their limits."""
+        config = self.config
+        try:
+            check_controller(config.host)
+            joints = read_limits(config.host)
+            check_reach(
+                *(joints, config.mounting, np.array(config.tool)),
+                *(np.array(config.reach), config.limits.speed),
+            )
+        except OSError as error:
+            raise RobotError(
+                f"robot at {config.host}: its state cannot be read: {error}"
+            ) from error
+        except (RuntimeError, ValueError) as error:
+            raise RobotError(str(error)) from error
 
     @property
     def _mailbox(self) -> Mailbox:
@@ -105,31 +147,35 @@ class Robot:
         """Number of the driver's process."""
         return self._process.pid if self._process else None
 
-    @property
-    def status(self) -> Status:
-        """State of driver and arm."""
-        return self._mailbox.status
+    def get_observation(self) -> RobotObservation:
+        """Return the newest observation of driver and arm, table frame."""
+        return self._mailbox.observation
 
     @property
     def state(self) -> DriverState:
         """State of the driver."""
-        return DriverState(int(self.status.state))
+        return DriverState(int(self.get_observation().state))
 
     @property
     def fault(self) -> Fault:
         """Reason of a HOLD or a FAULT."""
-        return Fault(int(self.status.fault))
+        return Fault(int(self.get_observation().fault))
+
+    @property
+    def transitions(self) -> list[Transition]:
+        """Last changes of the driver's state with their reasons, the newest last."""
+        return self._mailbox.transitions
 
     @property
     def commanded_at(self) -> float:
         """Time of the last command, of the monotonic clock, s."""
-        return self._mailbox.wanted.stamp
+        return self._mailbox.request.stamp
 
     @property
-    def alive(self) -> bool:
-        """True while the driver runs and tells of itself."""
+    def is_connected(self) -> bool:
+        """True while the driver runs and sends observations."""
         running = self._process is not None and self._process.is_alive()
-        return running and time.monotonic() - self.status.stamp < 2 * 0.15
+        return running and time.monotonic() - self.get_observation().stamp < SILENT
 
     @property
     def track(self) -> Array:
@@ -138,63 +184,76 @@ class Robot:
 
     def enable(self) -> None:
         """Take commands from now on; whoever holds the enabling device calls it."""
-        self._want(np.zeros(2), 0.0, 1.0)
+        self._request(np.zeros(2), 0.0, 1.0)
 
     def disable(self) -> None:
         """Brake and take no commands."""
-        self._want(np.zeros(2), 0.0, 0.0)
+        self._request(np.zeros(2), 0.0, 0.0)
 
-    def command(self, velocity: Array, seconds: float) -> None:
-        """Ask for a velocity (2,), table frame, m/s, reached in some seconds.
+    def send_action(self, velocity: Array, seconds: float) -> Array:
+        """Command a velocity, to be reached in some seconds.
 
         It holds until the next command, and no longer than 0.15 s.
-        """
-        self._want(velocity, seconds, self._enabled)
 
-    def _want(self, velocity: Array, seconds: float, enabled: float) -> None:
+        Args:
+            velocity: (2,) table frame, m/s.
+            seconds: Time of a linear ramp to it, s.
+
+        Returns:
+            (2,) velocity that the driver was sent, m/s: no faster than the limits
+            allow, and zero for one that is not finite or while the robot is not
+            enabled. What the arm was sent in turn is in the next observation.
+        """
+        self._request(velocity, seconds, self._enabled)
+        speed = float(np.linalg.norm(velocity))
+        if not (np.isfinite(speed) and self._enabled):
+            return np.zeros(2)
+        fit = min(1.0, self.config.limits.speed / max(speed, 1e-12))
+        return np.asarray(velocity, float) * fit
+
+    def _request(self, velocity: Array, seconds: float, enabled: float) -> None:
         self._enabled = enabled
-        self._mailbox.wanted = Wanted(
+        self._mailbox.request = Request(
             *(float(velocity[0]), float(velocity[1]), seconds, time.monotonic()),
             *(enabled, self._recoveries, 0.0),
         )
 
-    def go_to(self, place: Array, seconds: float = 10.0) -> None:
-        """Move the paddle slowly to a place (2,), table frame, m, and rest there.
+    def go_to(self, position: Array, seconds: float = 10.0) -> None:
+        """Move the paddle slowly to a position (2,), table frame, m, and rest there.
 
         Raises:
-            RobotError: it does not arrive in time, with the reason.
+            RobotError: It does not arrive in time, with the reason.
         """
         until = time.monotonic() + seconds
         self.enable()
         while time.monotonic() < until:
-            status = self.status
-            way = np.asarray(place) - (status.x, status.y)
+            now = self.get_observation()
+            way = np.asarray(position) - (now.x, now.y)
             left = float(np.linalg.norm(way))
-            moving = np.hypot(status.vx, status.vy)
-            if left < NEAR and moving < 0.01:
-                self.command(np.zeros(2), 0.0)
+            if left < NEAR and np.hypot(now.vx, now.vy) < 0.01:
+                self.send_action(np.zeros(2), 0.0)
                 return
-            self.command(way * min(SLOW / max(left, 1e-9), 3.0), 0.02)
+            self.send_action(way * min(SLOW / max(left, 1e-9), 3.0), 0.02)
             if self.state is DriverState.FAULT:
-                raise RobotError(f"robot: {self.fault.words}")
+                raise RobotError(f"robot: {self.fault.label}")
             time.sleep(0.02)
         self.disable()
         raise RobotError(
-            f"robot: the paddle did not come to {np.round(place, 3)} m within "
-            f"{seconds:.0f} s; {self.state.name}: {self.fault.words}"
+            f"robot: the paddle did not come to {np.round(position, 3)} m within "
+            f"{seconds:.0f} s; {self.state.name}: {self.fault.label}"
         )
 
     def recover(self) -> None:
-        """Go on after a protective stop, on an operator's word.
+        """Continue after a protective stop, on an operator's word.
 
         Raises:
-            RobotError: an emergency stop, which a person releases at the pendant before
+            RobotError: An emergency stop, which a person releases at the pendant before
                 the driver is started again; or the stop was less than 5 s ago.
         """
         if self.fault is Fault.EMERGENCY_STOP:
             raise RobotError(EMERGENCY)
-        if self.fault is Fault.ROBOT_SILENT or not self.alive:
-            self.close()
+        if self.fault in NEW_PROCESS or not self.is_connected:
+            self.disconnect()
             self.connect()
             return
         self._recoveries += 1
@@ -205,16 +264,16 @@ class Robot:
                 return
             time.sleep(0.01)
         raise RobotError(
-            f"robot: {self.fault.words} is not released; look at the arm, and wait at "
+            f"robot: {self.fault.label} is not released; look at the arm, and wait at "
             "least 5 s after a protective stop"
         )
 
-    def close(self) -> None:
+    def disconnect(self) -> None:
         """Brake, disconnect and end the driver."""
         if self._process is None:
             return
         if self._box is not None and self._process.is_alive():
-            self._box.wanted = Wanted(
+            self._box.request = Request(
                 0.0, 0.0, 0.0, time.monotonic(), 0.0, self._recoveries, 1.0
             )
         self._process.join(3.0)

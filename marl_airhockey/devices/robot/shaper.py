@@ -1,13 +1,13 @@
 """Shaper: the last filter before an arm, for each of its poses.
 
-From wanted velocities, which may be anything, it makes places that an arm can follow:
-within its speed, its acceleration and its jerk, and never beyond the reach. It goes on
-from what it has put out last, not from where the arm has got to.
+From target velocities, which may be anything, it makes positions that an arm can
+follow: within its speed, its acceleration and its jerk, and never beyond the reach. It
+continues from its last output, not from the measured position of the arm.
 
-What holds the limits, whatever is asked for: after every step the paddle could still
-be braked to rest within speed and reach. A step after which it could not is mixed with
-the braking step, which is always such a one, as it begins the braking that was looked
-at one step before.
+What holds the limits for any target: after every step the paddle could still be braked
+to rest within speed and reach. A step after which it could not is mixed with the
+braking step, which is always safe: it begins the braking that was checked one step
+before.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class MotionLimits:
 
     @property
     def stopping_distance(self) -> float:
-        """Way from top speed to rest, m."""
+        """Distance from top speed to rest, m."""
         lead = self.acceleration / (2.0 * self.jerk)
         return self.speed * (self.speed / (2.0 * self.acceleration) + lead)
 
@@ -59,18 +59,25 @@ class Shaper:
     """Shaper of one paddle's motion, table frame.
 
     Args:
-        limits: of the motion.
+        limits: Limits of the motion.
         reach: (K, 2) convex polygon of the paddle's centre, counter-clockwise, m.
-        dt: s between two steps.
-        place: (2,) where the paddle rests, m.
+        dt: Time between two steps, s.
+        place: (2,) position of the resting paddle, m.
+        margin: Distance from the edge of the reach that is kept, m.
     """
 
     def __init__(
-        self, limits: MotionLimits, reach: Array, dt: float, place: Array
+        self,
+        limits: MotionLimits,
+        reach: Array,
+        dt: float,
+        place: Array,
+        margin: float = 0.0,
     ) -> None:
         self._limits, self._dt = limits, dt
         corners = tuple((float(x), float(y)) for x, y in reach)
-        normals, self._offsets = half_planes(corners)
+        normals, offsets = half_planes(corners)
+        self._offsets = offsets - margin
         self._normals = normals[:, 0] + 1j * normals[:, 1]
         # Edges that meet share what can be braked with, as in the world's limits.
         meet = (normals * np.roll(normals, -1, 0)).sum(-1).min()
@@ -78,13 +85,13 @@ class Shaper:
         # Vectors are complex numbers: a hundred times as fast as arrays of two.
         self._place, self._velocity = complex(*place), 0j
         self._acceleration = 0j
-        # Who begins outside may go in, and no further out.
+        # A paddle that begins outside may come in, and move no further out.
         outside = -((self._normals.conj() * self._place).real + self._offsets)
         self._widened = self._offsets + np.maximum(outside, 0.0)
 
     @property
     def place(self) -> Array:
-        """(2,) m, where the arm was sent last."""
+        """(2,) position that the arm was sent to last, m."""
         return _array(self._place)
 
     @property
@@ -97,19 +104,20 @@ class Shaper:
         """(2,) m/s2, with which it got there."""
         return _array(self._acceleration)
 
-    def step(self, wanted: Array, seconds: float) -> Array:
-        """Go on by ``dt`` and return the new place (2,), m.
+    def step(self, velocity: Array, seconds: float) -> Array:
+        """Move by ``dt`` and return the new position (2,), m.
 
         Args:
-            wanted: (2,) velocity, m/s; one that is not finite is rest.
-            seconds: time in which it is to be reached by a linear ramp; 0 for at once.
+            velocity: (2,) target velocity, m/s; one that is not finite is rest.
+            seconds: Time in which it is to be reached by a linear ramp, s; 0 for
+                immediately.
         """
-        target = self._inside(_fitted(complex(*wanted), self._limits.speed))
+        target = self._inside(_fitted(complex(*velocity), self._limits.speed))
         moved = self._velocity, self._acceleration
         return self._advance(self._recoverable(self._toward(target, seconds, *moved)))
 
     def brake(self) -> Array:
-        """Go on by ``dt`` toward rest and return the new place (2,), m."""
+        """Move by ``dt`` toward rest and return the new position (2,), m."""
         return self._advance(self._toward(0j, 0.0, self._velocity, self._acceleration))
 
     def _advance(self, acceleration: complex) -> Array:

@@ -1,11 +1,13 @@
 """UR5e over the real-time interface of its controller, by ur-rtde.
 
-What its client does silently is worked around here, each where a comment says so. It
-must live in a process of its own: after one lost connection it reconnects for ever.
+The client has defects that it does not report. They are worked around here, each where
+a comment says so. It must live in a process of its own: after one lost connection it
+reconnects for ever.
 """
 
 from __future__ import annotations
 
+import re
 import time
 from typing import TYPE_CHECKING
 
@@ -13,25 +15,24 @@ import numpy as np
 
 from marl_airhockey.core.errors import require
 from marl_airhockey.devices.robot.arm import ArmFault, Reading
+from marl_airhockey.devices.robot.config import DriverConfig
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
     from rtde_control import RTDEControlInterface
 
-LOOK_AHEAD = 0.05
-"""s; longer is smoother and later"""
-GAIN = 300
-"""Gain of the position loop"""
 WATCHDOG = 10.0
 """Hz: the controller itself ends the program if commands come more rarely"""
 CYCLE = 0.006
-"""Time that the controller's clock must go on between two commands, s"""
+"""Time of the controller's clock that must pass between two commands, s"""
 ARRIVED = 0.02
 """Time after which the reason of a refusal has arrived, s"""
-COMPLIANCE = 0.15
-"""Largest speed of the compliant axis, m/s"""
 STOP = 5.0
 """Deceleration of joints in a halt, rad/s2"""
+ANSWER = 2000
+"""Longest time until a dashboard answers, ms"""
+OLDEST, NEWER = (5, 4), (6, 0)
+"""Oldest version of PolyScope that is supported, and the first that is not again"""
 VARIABLES = (
     *("timestamp", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force"),
     "actual_q",
@@ -40,7 +41,7 @@ VARIABLES = (
 
 
 class PoseReader:
-    """Reader of where an arm's tool is, which moves nothing.
+    """Reader of an arm's tool, which moves nothing.
 
     The tool's centre is the one that is set at the pendant: the paddle's foot.
 
@@ -66,7 +67,7 @@ class PoseReader:
     def read(self) -> tuple[float, Array, Array]:
         """Return the robot's time, s, the pose (6,) and the velocity (6,), per s.
 
-        A time that stands still is a robot that is silent.
+        A time that does not advance means a robot that is silent.
         """
         velocity = np.array(self._receive.getActualTCPSpeed())
         return self._receive.getTimestamp(), self.pose(), velocity
@@ -76,27 +77,67 @@ class PoseReader:
         self._receive.disconnect()
 
 
+def check_controller(host: str) -> None:
+    """Refuse a controller that a driver cannot use, before anything connects.
+
+    Raises:
+        RuntimeError: ur-rtde is not installed, no controller answers, its version is
+            not supported, it is not in remote control, or the arm has no power.
+    """
+    require("dashboard_client", "hardware")
+    from dashboard_client import DashboardClient
+
+    board, robot = DashboardClient(host), f"robot at {host}"
+    try:
+        board.connect(ANSWER)
+        version = board.polyscopeVersion()
+    except RuntimeError as error:
+        raise RuntimeError(
+            f"{robot}: no arm answers; is it switched on, and in this network?"
+        ) from error
+    try:
+        found = re.search(r"(\d+)\.(\d+)\.", version)
+        number = (int(found[1]), int(found[2])) if found else (0, 0)
+        if not OLDEST <= number < NEWER:
+            raise RuntimeError(
+                f"{robot}: PolyScope {version.strip()!r} is not supported; this driver "
+                f"needs {OLDEST[0]}.{OLDEST[1]} or newer, below {NEWER[0]}"
+            )
+        if not board.isInRemoteControl():
+            raise RuntimeError(
+                f"{robot}: it is in local control; switch it to remote control at the "
+                "pendant"
+            )
+        mode = board.robotmode()
+        if "RUNNING" not in mode:
+            raise RuntimeError(
+                f"{robot}: {mode.strip()}; switch the arm on and release its brakes at "
+                "the pendant"
+            )
+    finally:
+        board.disconnect()
+
+
 class Ur5e:
     """UR5e as an `arm.Arm`.
 
     Args:
-        host: address of its controller.
-        tool: (6,) pose of the tool's centre in the flange's frame, m and rad.
-        payload: mass of the tool, kg.
+        config: Configuration of its driver.
 
     Raises:
         RuntimeError: ur-rtde is not installed, or no controller answers.
     """
 
-    def __init__(self, host: str, tool: Array, payload: float) -> None:
+    def __init__(self, config: DriverConfig) -> None:
         # Constructors hold Python's lock until they have connected.
         require("rtde_control", "hardware")
         from rtde_receive import RTDEReceiveInterface
 
-        self._host, self._tool = host, [float(x) for x in tool]
-        self._payload = payload
-        self._receive = RTDEReceiveInterface(host, 500.0, list(VARIABLES))
+        self._host, self._tool = config.host, [float(x) for x in config.tool]
+        self._payload, self._servo = config.payload, config.servo
+        self._receive = RTDEReceiveInterface(self._host, 500.0, list(VARIABLES))
         self._program: RTDEControlInterface | None = None
+        self._lost = False
         if self._stop() is ArmFault.NONE:
             self._control()
 
@@ -111,7 +152,6 @@ class Ur5e:
             program = RTDEControlInterface(self._host)
             program.setTcp(self._tool)
             program.setPayload(self._payload, [0.0, 0.0, self._tool[2] / 2])
-            program.zeroFtSensor()
             program.setWatchdog(WATCHDOG)
             self._program = program
         return self._program
@@ -130,6 +170,8 @@ class Ur5e:
         )
 
     def _fault(self) -> ArmFault:
+        if self._lost or not self._receive.isConnected():
+            return ArmFault.CONNECTION_LOST
         stop = self._stop()
         if stop is ArmFault.NONE and not self._control().isProgramRunning():
             return ArmFault.PROGRAM_LOST
@@ -142,9 +184,12 @@ class Ur5e:
             return ArmFault.PROTECTIVE_STOP
         return ArmFault.NONE
 
+    def zero_force_sensor(self) -> None:
+        self._control().zeroFtSensor()
+
     def press(self, frame: Array, newtons: float) -> None:
         wrench = [0.0, 0.0, -abs(newtons), 0.0, 0.0, 0.0]
-        limits = [2.0, 2.0, COMPLIANCE, 1.0, 1.0, 1.0]
+        limits = [2.0, 2.0, self._servo.compliance, 1.0, 1.0, 1.0]
         self._control().forceMode(list(frame), [0, 0, 1, 0, 0, 0], wrench, 2, limits)
         self._wait_cycle()
 
@@ -162,7 +207,14 @@ class Ur5e:
         # and acceleration do nothing: both are the shaper's.
         if not np.isfinite(pose).all():
             return False
-        sent = self._control().servoL(list(pose), 0.5, 0.5, seconds, LOOK_AHEAD, GAIN)
+        loop = self._servo.look_ahead, self._servo.gain
+        try:
+            sent = self._control().servoL(list(pose), 0.5, 0.5, seconds, *loop)
+        except RuntimeError:
+            # The connection is lost. The client reconnects for ever, and uploads its
+            # script each time: nothing of it can be used again.
+            self._lost = True
+            return False
         if not sent:
             time.sleep(ARRIVED)
         return bool(sent)

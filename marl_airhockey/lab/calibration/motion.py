@@ -52,12 +52,15 @@ def lead(
     began = time.monotonic()
     while (now := time.monotonic() - began) < seconds:
         place, velocity = path(now)
-        status = robot.status
+        status = robot.get_observation()
         # It stays about its path whatever commands come late.
         drift = home + place - (status.sent_x, status.sent_y)
-        robot.command(velocity + PULL * drift, 0.02)
-        if robot.state in (DriverState.FAULT, DriverState.HOLD) or not robot.alive:
-            raise RuntimeError(f"robot: {robot.fault.words}")
+        robot.send_action(velocity + PULL * drift, 0.02)
+        if (
+            robot.state in (DriverState.FAULT, DriverState.HOLD)
+            or not robot.is_connected
+        ):
+            raise RuntimeError(f"robot: {robot.fault.label}")
         reported.append(robot.track[-40:])
         sent.append((status.stamp, status.sent_x, status.sent_y))
         tell(now)

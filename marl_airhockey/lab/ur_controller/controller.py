@@ -25,6 +25,8 @@ SPACING = 4
 """Periods between two commands of a client that sends 125 a second"""
 OFFSET = re.compile(r"reg_offset_int\s*=\s*(?:#[^\n]*\n)?\s*(\d+)")
 """Place in the script of ur_rtde where the first of its registers is written"""
+STALL_EVERY = 250
+"""Periods from one stall to the next, a fault"""
 UNLOCK_AFTER = 5.0
 """Time that a protective stop lasts at least, s, as the real dashboard says"""
 
@@ -52,6 +54,7 @@ class Controller:
         """Time by which data is sent late, a fault, s"""
         self.stall = 0.0
         """Time for which the controller does nothing twice a second, a fault, s"""
+        self._stall_from = 0
         self.refuses = False
         """True if connections are closed and refused, a fault"""
         self._outputs = 0
@@ -99,6 +102,16 @@ class Controller:
             return False
         self.arm.release()
         return True
+
+    def set_stall(self, seconds: float) -> None:
+        """Do nothing for some seconds, now and then twice a second; 0 ends it."""
+        self.stall, self._stall_from = seconds, self.ticks
+
+    @property
+    def stall_is_due(self) -> bool:
+        """True in the periods after which the controller does nothing for a while."""
+        passed = self.ticks - self._stall_from
+        return bool(self.stall) and passed % STALL_EVERY == 1
 
     def take(self, recipe: Recipe, body: bytes) -> None:
         """Keep what a client has written for the next period."""

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.jit.cache import cache_folder
 from marl_airhockey.lab.door import open_door
@@ -63,6 +65,20 @@ def door_file(address: str) -> Path:
     return cache_folder() / f"ur-emulator-{address}.json"
 
 
+def status_of(controller: Controller) -> dict[str, Any]:
+    """Return what a controller does now, for a person or a test."""
+    arm, script = controller.arm, controller.script
+    return {
+        "safety": arm.safety.name,
+        "stopped": arm.stopped,
+        "program": "running" if script.running else "stopped",
+        "pose": [round(float(x), 5) for x in arm.reading.pose],
+        "speed": round(float(np.linalg.norm(arm.twist[:3])), 5),
+        "force": round(float(np.linalg.norm(arm.reading.force[:3])), 2),
+        "commands": {str(k): n for k, n in sorted(script.counts.items())},
+    }
+
+
 async def serve_emulator(
     controller: Controller,
     address: str,
@@ -82,16 +98,19 @@ async def serve_emulator(
 
     async def switch(name: str, on: bool) -> dict[str, Any]:
         FAULTS[name].switch(controller, on)
-        return {"safety": controller.arm.safety.name}
+        return status_of(controller)
+
+    async def report() -> dict[str, Any]:
+        return status_of(controller)
 
     def answer(order: dict[str, Any]) -> dict[str, Any]:
-        name = order.get("name")
-        if order.get("do") != "fault" or name not in FAULTS:
-            raise ValueError(unknown_name("fault", name, FAULTS))
-        switched = asyncio.run_coroutine_threadsafe(
-            switch(name, bool(order["on"])), loop
-        )
-        return switched.result(5.0)
+        name, work = order.get("name"), report()
+        if order.get("do") == "fault":
+            work.close()
+            if name not in FAULTS:
+                raise ValueError(unknown_name("fault", name, FAULTS))
+            work = switch(name, bool(order["on"]))
+        return asyncio.run_coroutine_threadsafe(work, loop).result(5.0)
 
     async def follow(fault: ScheduledFault) -> None:
         await asyncio.sleep(fault.begin)

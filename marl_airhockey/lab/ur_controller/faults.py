@@ -56,7 +56,7 @@ def _dropped(controller: Controller, on: bool) -> None:
 
 
 def _stalled(controller: Controller, on: bool) -> None:
-    controller.stall = STALL if on else 0.0
+    controller.set_stall(STALL if on else 0.0)
 
 
 def _raised(controller: Controller, on: bool) -> None:

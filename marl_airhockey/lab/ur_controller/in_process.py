@@ -13,17 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from marl_airhockey.devices.robot.arm import ArmFault, Reading
-from marl_airhockey.devices.robot.ur5e import (
-    COMPLIANCE,
-    GAIN,
-    LOOK_AHEAD,
-    STOP,
-    WATCHDOG,
-)
+from marl_airhockey.devices.robot.config import ServoSettings
+from marl_airhockey.devices.robot.ur5e import STOP, WATCHDOG
 from marl_airhockey.lab.ur_controller.arm import DT, Safety
 from marl_airhockey.lab.ur_controller.controller import PLAYING, Controller
 from marl_airhockey.lab.ur_controller.dashboard import LOCKED
-from marl_airhockey.lab.ur_controller.ports import STALL_EVERY
 from marl_airhockey.lab.ur_controller.rtde import Recipe
 from marl_airhockey.types import Array
 
@@ -61,13 +55,16 @@ class InProcessArm:
 
     Args:
         controller: Controller, which nobody else steps.
+        servo: Settings of its loops; None for the usual ones.
     """
 
-    def __init__(self, controller: Controller) -> None:
-        self.controller = controller
+    def __init__(
+        self, controller: Controller, servo: ServoSettings | None = None
+    ) -> None:
+        self.controller, self._servo = controller, servo or ServoSettings()
         self.now = 0.0
         """Emulated time, s"""
-        self._stalled = 0.0
+        self._stall_left = 0.0
         self._samples: deque[Sample] = deque()
         self._values = controller.values()
         controller.upload(SCRIPT)
@@ -88,17 +85,22 @@ class InProcessArm:
     def _set_watchdog(self) -> None:
         self._command(35, WATCHDOG)
 
+    @property
+    def stalled(self) -> bool:
+        """True while the controller does nothing."""
+        return self._stall_left > 0.0
+
     def advance(self, seconds: float) -> None:
         """Let emulated time pass."""
         controller = self.controller
         for _ in range(round(seconds / DT)):
             self.now += DT
-            if self._stalled > 0.0:
-                self._stalled -= DT
+            if self.stalled:
+                self._stall_left -= DT
                 continue
             controller.step()
-            if controller.stall and controller.ticks % STALL_EVERY == 0:
-                self._stalled = controller.stall
+            if controller.stall_is_due:
+                self._stall_left = controller.stall
             if not (controller.silent or controller.refuses):
                 values = controller.values()
                 self._samples.append(Sample(self.now + controller.delay, values))
@@ -118,6 +120,8 @@ class InProcessArm:
         )
 
     def _fault(self) -> ArmFault:
+        if self.controller.refuses:
+            return ArmFault.CONNECTION_LOST
         safety = FAULTS[Safety(self._values["safety_mode"])]
         running = self._values["runtime_state"] == PLAYING
         if safety is ArmFault.NONE and not running:
@@ -126,16 +130,17 @@ class InProcessArm:
 
     def press(self, frame: Array, newtons: float) -> None:
         """Become compliant along the z axis of a frame (6,) and press down."""
-        limits = 2.0, 2.0, COMPLIANCE, 1.0, 1.0, 1.0
+        limits = 2.0, 2.0, self._servo.compliance, 1.0, 1.0, 1.0
         wrench = 0.0, 0.0, -abs(newtons), 0.0, 0.0, 0.0
         self._send(FORCE, 6, 2, 0, 0, 1, 0, 0, 0, *frame, *wrench, *limits)
         self.advance(4 * DT)
 
     def follow(self, pose: Array, seconds: float) -> bool:
         """Follow a pose (6,) until the next one ``seconds`` later; False if refused."""
-        if not np.isfinite(pose).all() or self._values["runtime_state"] != PLAYING:
+        if not np.isfinite(pose).all() or self._fault():
             return False
-        self._send(SERVO, 24, *pose, 0.5, 0.5, seconds, LOOK_AHEAD, GAIN)
+        loop = self._servo.look_ahead, self._servo.gain
+        self._send(SERVO, 24, *pose, 0.5, 0.5, seconds, *loop)
         return True
 
     def zero_force_sensor(self) -> None:

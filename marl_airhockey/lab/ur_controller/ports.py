@@ -27,8 +27,6 @@ LATE = 0.25
 """Time by which the loop may lag before it gives up what it missed, s"""
 BEHIND = 0.006
 """Delay of a period from which on the controller counts as late, s"""
-STALL_EVERY = 250
-"""Periods from one stall to the next, a fault"""
 PRESS_PLAY = 0.4
 """Time after which somebody at the pendant starts External Control for a client that
 has uploaded no script, s"""
@@ -100,7 +98,7 @@ class Ports:
             if self._clients and not controller.silent:
                 values = controller.values()
                 loop.call_later(controller.delay, self._send, controller.ticks, values)
-            if controller.stall and controller.ticks % STALL_EVERY == 0:
+            if controller.stall_is_due:
                 await asyncio.sleep(controller.stall)
             due += DT
             wait = due - loop.time()

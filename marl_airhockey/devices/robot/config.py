@@ -1,0 +1,106 @@
+"""Configuration of a robot's driver: where its table is and how it may move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from marl_airhockey.devices.robot.filters import Smoothing
+from marl_airhockey.devices.robot.mounting import Mounting
+from marl_airhockey.devices.robot.shaper import MotionLimits
+
+SHARE = 0.7
+"""Largest fraction of the pendant's limits that motion may use"""
+
+
+@dataclass(frozen=True)
+class Pendant:
+    """Limits that are set at the robot's pendant, which software cannot change.
+
+    A controller reports none of them, so a person copies them from the pendant.
+    """
+
+    speed: float = 1.5
+    """Speed of the tool, m/s"""
+    force: float = 150.0
+    """Force on the tool, N"""
+
+
+def check_pendant(limits: MotionLimits, pendant: Pendant) -> None:
+    """Refuse limits above what the pendant's leave room for.
+
+    Raises:
+        ValueError: They are.
+    """
+    if limits.speed > SHARE * pendant.speed:
+        raise ValueError(
+            f"limits.speed: {limits.speed} m/s is above {SHARE:.0%} of the pendant's "
+            f"{pendant.speed} m/s; lower it, or have the pendant's raised by whoever "
+            "answers for the robot"
+        )
+
+
+@dataclass(frozen=True)
+class ServoSettings:
+    """Settings of the controller's own loops."""
+
+    look_ahead: float = 0.05
+    """Time by which `servoL` smooths, s; longer is smoother and later"""
+    gain: float = 300.0
+    """Gain of the position loop of `servoL`"""
+    force: float = 5.0
+    """Force with which the paddle is pressed on the table, N"""
+    compliance: float = 0.15
+    """Largest speed of the compliant axis, m/s"""
+    deviation: float = 0.1
+    """Distance between where the paddle was sent and where it is, beyond which the arm
+    does not follow, m: more than twice the lag of a UR5e at 0.7 m/s"""
+
+
+@dataclass(frozen=True)
+class DriverConfig:
+    """Configuration of a driver.
+
+    Raises:
+        ValueError: Limits above what the pendant's leave room for.
+    """
+
+    host: str
+    """Address of the arm's controller"""
+    mounting: Mounting
+    reach: tuple[tuple[float, float], ...]
+    """Convex polygon of the paddle's centre, counter-clockwise, table frame, m"""
+    limits: MotionLimits = field(default_factory=MotionLimits)
+    tool: tuple[float, ...] = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
+    """Pose of the paddle's foot in the flange's frame, m and rad"""
+    payload: float = 0.6
+    """Mass of the paddle and what holds it, kg"""
+    smoothing: Smoothing = field(default_factory=Smoothing)
+    """Filter of the commands, before the shaper"""
+    servo: ServoSettings = field(default_factory=ServoSettings)
+    pendant: Pendant = field(default_factory=Pendant)
+
+    def __post_init__(self) -> None:
+        check_pendant(self.limits, self.pendant)
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Limits and settings that belong together."""
+
+    limits: MotionLimits = field(default_factory=MotionLimits)
+    servo: ServoSettings = field(default_factory=ServoSettings)
+    pendant: Pendant = field(default_factory=Pendant)
+
+
+PRESETS = {
+    "ur5e": Preset(),
+    # Steps of 0.26 m in 50 ms and nothing else: the constants of the authors' robot
+    # code, whose limits of speed and acceleration in `servoL` do nothing. They are here
+    # for comparison with an emulator: `Robot.connect` refuses them on every arm.
+    "authors": Preset(
+        MotionLimits(speed=5.2, acceleration=500.0, jerk=1e6),
+        ServoSettings(look_ahead=0.2, gain=700.0, compliance=1.5, deviation=9.0),
+        Pendant(speed=7.5),
+    ),
+}
+"""Presets by name"""

@@ -1,0 +1,166 @@
+"""Emulated robot: a driver and its controller in this process, in emulated time.
+
+The driver is the one that moves a real arm, the controller is that of `airhockey
+ur-emulator`; between them is `InProcessArm` instead of ur_rtde. Ten minutes of driving
+take half a minute, and the same calls give the same motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from marl_airhockey.devices.robot import (
+    DriverConfig,
+    DriverState,
+    Fault,
+    Preset,
+    RobotObservation,
+    Smoothing,
+    Transition,
+)
+from marl_airhockey.devices.robot.driver import RATE, Driver
+from marl_airhockey.devices.robot.mailbox import Mailbox, Request
+from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.lab.ur_controller.arm import DT
+from marl_airhockey.lab.ur_controller.controller import Controller
+from marl_airhockey.lab.ur_controller.faults import FAULTS
+from marl_airhockey.lab.ur_controller.in_process import InProcessArm
+from marl_airhockey.types import Array
+
+EVERY = round(1.0 / RATE / DT)
+"""Periods of the controller in a cycle of the driver"""
+
+
+class EmulatedRobot:
+    """Emulated robot over an empty table.
+
+    Args:
+        preset: Limits and settings; None for the usual ones.
+        smoothing: Filter of the commands; None for none.
+        setup: Lab in which it stands; None for the usual one.
+        away: Distance by which the arm stands away from its table, m.
+    """
+
+    def __init__(
+        self,
+        preset: Preset | None = None,
+        smoothing: Smoothing | None = None,
+        setup: LabSetup | None = None,
+        away: float = 0.0,
+    ) -> None:
+        self.setup, preset = setup or LabSetup(), preset or Preset()
+        self.config = DriverConfig(
+            host="",
+            mounting=self.setup.mounting,
+            reach=self.setup.seat.reach,
+            limits=preset.limits,
+            servo=preset.servo,
+            pendant=preset.pendant,
+            smoothing=smoothing or Smoothing(),
+        )
+        self.controller = Controller(self.setup.make_arm())
+        if away:
+            x, y, z = self.setup.mounting.origin
+            mounting = replace(self.setup.mounting, origin=(x + away, y, z))
+            self.config = replace(self.config, mounting=mounting)
+        self.arm = InProcessArm(self.controller, self.config.servo)
+        self._ticks = 0
+        self.start_driver()
+
+    def start_driver(self) -> None:
+        """Start a driver, as a new process does; it replaces the present one."""
+        self._recoveries, self._enabled = 0, False
+        self._box = Mailbox(Mailbox.allocate())
+        self.driver = Driver(self.config, self.arm, self._box, lambda: self.arm.now)
+        self.driver_runs = True
+        """False for a driver whose process was killed or is held up."""
+        self._request(np.zeros(2), 0.0)
+        self.driver.cycle()
+
+    @property
+    def now(self) -> float:
+        """Emulated time, s."""
+        return self.arm.now
+
+    @property
+    def state(self) -> DriverState:
+        """State of the driver."""
+        return self.driver.supervisor.state
+
+    @property
+    def fault(self) -> Fault:
+        """Reason of a HOLD or a FAULT."""
+        return self.driver.supervisor.fault
+
+    @property
+    def transitions(self) -> list[Transition]:
+        """Last changes of the driver's state with their reasons, the newest last."""
+        return self._box.transitions
+
+    def get_observation(self) -> RobotObservation:
+        """Return the newest observation."""
+        return self._box.observation
+
+    @property
+    def true_position(self) -> Array:
+        """(3,) the paddle as it is, table frame, m."""
+        return self.setup.mounting.to_table(self.controller.arm.pose[:3, 3])
+
+    @property
+    def true_velocity(self) -> Array:
+        """(2,) its velocity, table frame, m/s."""
+        return self.setup.mounting.rotate_to_table(self.controller.arm.twist)[:2]
+
+    def enable(self) -> None:
+        """Take commands from now on."""
+        self._enabled = True
+        self._request(np.zeros(2), 0.0)
+
+    def disable(self) -> None:
+        """Brake and take no commands."""
+        self._enabled = False
+        self._request(np.zeros(2), 0.0)
+
+    def send_action(self, velocity: Array, seconds: float = 0.05) -> None:
+        """Command a velocity (2,), table frame, m/s, to be reached in some seconds."""
+        self._request(velocity, seconds)
+
+    def _request(self, velocity: Array, seconds: float) -> None:
+        self._box.request = Request(
+            *(float(velocity[0]), float(velocity[1]), seconds, self.now),
+            *(float(self._enabled), float(self._recoveries), 0.0),
+        )
+
+    def recover(self) -> None:
+        """Request a recovery, as an operator does."""
+        self._recoveries += 1
+        self.disable()
+
+    def switch(self, fault: str, on: bool = True) -> None:
+        """Switch a fault of the controller on or off."""
+        FAULTS[fault].switch(self.controller, on)
+
+    def advance(self, seconds: float) -> None:
+        """Let emulated time pass."""
+        for _ in range(round(seconds / DT)):
+            if self._ticks % EVERY == 0 and self.driver_runs:
+                self.driver.cycle()
+            self.arm.advance(DT)
+            self._ticks += 1
+
+    def drive_to(
+        self, position: Array, seconds: float = 5.0, near: float = 0.004
+    ) -> bool:
+        """Move the paddle to a position (2,), m; return True if it arrived."""
+        self.enable()
+        until = self.now + seconds
+        while self.now < until:
+            way = np.asarray(position) - self.true_position[:2]
+            left = float(np.linalg.norm(way))
+            if left < near and np.linalg.norm(self.true_velocity) < 0.01:
+                return True
+            self.send_action(way * min(0.25 / max(left, 1e-9), 3.0), 0.02)
+            self.advance(0.02)
+        return False

@@ -1,0 +1,181 @@
+"""Measure how an arm comes to rest for every fault, and for every pair of faults.
+
+    python scripts/bench/stops_emulated.py --out docs/data/stops_emulated.json
+
+The driver of the robot moves the emulated arm at 0.3 to 0.7 m/s when one or two faults
+are switched on, in emulated time; the second comes 0 to 200 ms after the first. Printed
+are medians and worst values over the trials: the time from the first fault until
+braking begins (the driver or the controller slows down what the arm is sent), the time
+until the paddle rests (below 0.01 m/s), and the largest deceleration of a joint and of
+the tool, over 2 ms. Commands that stop count from the last one. `stops.py` measures the
+same with processes, the real client and a real clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.lab.ur_controller.arm import DT
+from marl_airhockey.lab.ur_controller.motions import Halt
+from marl_airhockey.types import Array
+
+CONTROL_DT = 0.05
+LISTEN = 4.0
+"""Time after a fault for which the arm is watched, s"""
+CONTROLLER = (
+    *("protective_stop", "emergency_stop", "silent_robot", "delayed_packets"),
+    *("dropped_connection", "loss_of_real_time", "puck_under_paddle"),
+    *("speed_slider", "power_off"),
+)
+"""Faults of the controller; local control stops no program that runs"""
+
+
+class Caller:
+    """Caller of the driver: a policy that commands one velocity, and its faults."""
+
+    def __init__(self, robot: EmulatedRobot, velocity: Array) -> None:
+        self.robot, self.velocity = robot, velocity
+        self.silent, self.sends_nan = False, False
+        self._due = robot.now
+        self.last = robot.now
+        """Time of the last command that made sense, s"""
+
+    def step(self) -> None:
+        """Send a command, if one is due."""
+        if self.robot.now + 1e-9 < self._due:
+            return
+        self._due += CONTROL_DT
+        if self.silent:
+            return
+        velocity = self.velocity
+        if self.sends_nan:
+            velocity = np.full(2, np.nan)
+        else:
+            self.last = self.robot.now
+        self.robot.send_action(velocity, CONTROL_DT)
+
+    def fall_silent(self) -> None:
+        """Send nothing more."""
+        self.silent = True
+
+    def send_nan(self) -> None:
+        """Send what is no number from now on."""
+        self.sends_nan = True
+
+    def kill_driver(self) -> None:
+        """End the driver's process."""
+        self.robot.driver_runs = False
+
+
+def faults_of(caller: Caller) -> dict[str, Callable[[], None]]:
+    """Return what switches each fault on, by name."""
+
+    def of_controller(name: str) -> Callable[[], None]:
+        return lambda: caller.robot.switch(name)
+
+    return {
+        **{name: of_controller(name) for name in CONTROLLER},
+        "commands_stop": caller.fall_silent,
+        "commands_are_nan": caller.send_nan,
+        "driver_killed": caller.kill_driver,
+    }
+
+
+def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float, ...]:
+    """Return the times of braking and rest, s, and the largest decelerations."""
+    robot = EmulatedRobot()
+    sign = rng.choice([-1.0, 1.0])
+    assert robot.drive_to(np.array(robot.setup.home) - (0.0, 0.25 * sign))
+    caller = Caller(robot, np.array([0.0, sign * rng.uniform(0.3, 0.7)]))
+    begin = robot.now + 0.35 + rng.uniform(0.0, CONTROL_DT)
+    while robot.now < begin:
+        caller.step()
+        robot.advance(DT)
+    switches = faults_of(caller)
+    gaps = [0.0, *rng.uniform(0.0, 0.2, len(names) - 1)]
+    pending = [
+        (begin + gap, switches[name]) for gap, name in zip(gaps, names, strict=True)
+    ]
+    first = robot.now
+    speed = float(np.linalg.norm(robot.true_velocity))
+    begins = rests = joints = tool = np.nan
+    while robot.now < first + LISTEN and np.isnan(rests):
+        while pending and robot.now >= pending[0][0]:
+            pending.pop(0)[1]()
+        caller.step()
+        before = robot.controller.arm.speeds, np.linalg.norm(robot.true_velocity)
+        robot.advance(DT)
+        after = robot.controller.arm.speeds, np.linalg.norm(robot.true_velocity)
+        slowing = float(np.max(np.abs(before[0]) - np.abs(after[0]))) / DT
+        joints = np.fmax(joints, slowing)
+        tool = np.fmax(tool, float(before[1] - after[1]) / DT)
+        sent = robot.get_observation()
+        halts = isinstance(robot.controller.arm.motion, Halt)
+        slows = np.hypot(sent.sent_vx, sent.sent_vy) < 0.98 * speed
+        if np.isnan(begins) and (halts or slows or after[1] < 0.98 * speed):
+            begins = robot.now
+        if after[1] < 0.01:
+            rests = robot.now
+    since = caller.last if names == ("commands_stop",) else first
+    return begins - since, rests - since, float(joints), float(tool)
+
+
+def measure(names: tuple[str, ...], trials: int) -> dict[str, object]:
+    """Return medians and worst values of some trials."""
+    rng = np.random.default_rng([len(names), *(map(ord, "".join(names)))])
+    rows = np.array([try_faults(names, rng) for _ in range(trials)])
+    median, worst = np.median(rows, 0), rows.max(0)
+    columns = ("begins_s", "rest_s", "joint_rad_s2", "tool_m_s2")
+    return {
+        "faults": " + ".join(names),
+        "trials": trials,
+        **{
+            name: {"median": round(float(m), 4), "worst": round(float(w), 4)}
+            for name, m, w in zip(columns, median, worst, strict=True)
+        },
+    }
+
+
+def show(row: dict[str, object]) -> None:
+    """Print a row of the table."""
+    cells = []
+    for name, scale, form in (
+        ("begins_s", 1e3, "{:.0f}"),
+        ("rest_s", 1e3, "{:.0f}"),
+        ("joint_rad_s2", 1.0, "{:.1f}"),
+        ("tool_m_s2", 1.0, "{:.1f}"),
+    ):
+        pair = row[name]
+        assert isinstance(pair, dict)
+        values = [form.format(scale * pair[key]) for key in ("median", "worst")]
+        cells.append(" / ".join(values))
+    print(f"| {row['faults']} | " + " | ".join(cells) + " |", flush=True)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--out", type=Path, help="file for the rows, JSON")
+    given = parser.parse_args()
+    robot = EmulatedRobot()
+    names = [*faults_of(Caller(robot, np.zeros(2)))]
+    print("| faults | braking begins, ms | at rest, ms | joint, rad/s2 | tool, m/s2 |")
+    print("| --- | --- | --- | --- | --- |")
+    rows = []
+    for group in [(name,) for name in names] + [*itertools.combinations(names, 2)]:
+        rows.append(measure(group, given.trials))
+        show(rows[-1])
+    if given.out:
+        given.out.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
