@@ -1,7 +1,8 @@
-"""Real UR5e that a person leads by hand: the paddle is where its tool is."""
+"""UR5e in a seat of a simulated table: the paddle is where the arm's tool is."""
 
 from __future__ import annotations
 
+import ipaddress
 import time
 from pathlib import Path
 from typing import Any, Self
@@ -9,64 +10,191 @@ from typing import Any, Self
 import numpy as np
 
 from marl_airhockey.devices.rig import Rig
+from marl_airhockey.devices.robot import DriverConfig, DriverState, Mounting, Robot
+from marl_airhockey.devices.robot.nominal import nominal_mounting, table_of
 from marl_airhockey.devices.robot.ur5e import PoseReader
-from marl_airhockey.toolkit import Driver, PrescribedMotion
+from marl_airhockey.toolkit import (
+    Array,
+    Driver,
+    PrescribedMotion,
+    RandomStreams,
+    Seat,
+    View,
+)
 
 SILENT = 0.5
 """Time without news from the arm after which it is an error, s"""
 
 
 class Ur5e(Driver):
-    """Driver that prescribes where the tool of a real arm is; it moves nothing.
+    """Driver whose paddle is where the tool of an arm is: a digital twin.
 
-    The arm is led by hand, in freedrive, or by a controller of its own; its seat on a
-    simulated table follows as the rig's mounting says.
+    Without a policy it moves nothing: a person leads the arm in freedrive, or another
+    program commands it. With one, the policy's actions are sent to an emulated arm, in
+    real time, and the simulated paddle follows what the arm does. On a real arm
+    policies play with ``--backend real``, which watches the table, too.
+
+    Args:
+        rig: File of a calibrated table, ``airhockey calibrate`` writes it.
+        host: Address of the controller, if there is no rig: ``airhockey ur-emulator``.
+        policy: Agent that commands an emulated arm; None moves nothing.
 
     Raises:
-        ValueError: no rig, or one that cannot be read.
+        ValueError: Neither a rig nor a host; a rig that cannot be read; a policy for an
+            arm that is not emulated.
     """
 
     needs_device = True
 
-    def __init__(self, rig: str) -> None:
-        self._rig = Rig.load(Path(rig))
+    def __init__(
+        self, rig: str = "", host: str = "", policy: Driver | None = None
+    ) -> None:
+        if bool(rig) == bool(host):
+            raise ValueError(
+                "ur5e: name a controller, host=127.0.0.5 (airhockey ur-emulator), or a "
+                "calibrated table, rig=rig.json"
+            )
+        self._rig = Rig.load(Path(rig)) if rig else None
+        self._host = self._rig.robot if self._rig else host
+        self._policy = policy
+        if policy is not None:
+            self.commands_device, self.observe = True, policy.observe
+            self.control_dt = policy.control_dt
+            _check_emulated(self._host)
+        self._reach: tuple[tuple[float, float], ...] = ()
+        self._mounting = self._rig.mounting if self._rig else None
         self._reader: PoseReader | None = None
-        self._stamp, self._heard = -1.0, 0.0
+        self._robot: Robot | None = None
+        self._stamp, self._heard, self._due = -1.0, 0.0, 0.0
 
     def __getstate__(self) -> dict[str, Any]:
+        if self._robot is not None:
+            raise TypeError("ur5e: an arm that a policy commands cannot be copied")
         return {**self.__dict__, "_reader": None}
 
     def __enter__(self) -> Self:
-        self._connect()
+        if self._policy is not None:
+            self._policy.__enter__()
         return self
 
-    def _connect(self) -> PoseReader:
-        """Return the arm's reader; a copy of a driver gets one of its own."""
-        if self._reader is None:
-            self._reader = PoseReader(self._rig.robot)
-            self._heard = time.monotonic()
-        return self._reader
+    def check(self, observation: Any) -> None:
+        if self._policy is not None:
+            self._policy.check(observation)
 
-    def measured(self) -> PrescribedMotion:
-        """Return (1, 4) place and velocity of the tool, as the arm tells them.
+    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+        """Return the memory of the policy; connect to the arm at the first episode.
 
         Raises:
-            RuntimeError: no controller answers, or it has fallen silent.
+            ValueError: Without a rig, the seat is no robot's.
         """
-        stamp, pose, velocity = self._connect().read()
+        self._reach = seat.reach
+        if self._mounting is None:
+            self._mounting = nominal_mounting(table_of(seat))
+        if self._policy is None:
+            return {}
+        self._connect_robot()
+        return self._policy.reset(seat, rng, worlds)
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Return the action of the policy, which is sent to the arm."""
+        assert self._policy is not None
+        action, memory = self._policy.act(view, memory)
+        robot = self._connect_robot()
         now = time.monotonic()
+        if self._due > now:
+            time.sleep(self._due - now)
+        self._due = max(self._due, now) + view.control_dt
+        if robot.state is DriverState.READY:
+            robot.enable()
+        robot.send_action(action[0] * view.top_speed[0], view.control_dt)
+        return action, memory
+
+    @property
+    def trouble(self) -> str:
+        stopped = (DriverState.HOLD, DriverState.FAULT)
+        if self._robot is None or self._robot.state not in stopped:
+            return ""
+        return f"robot: {self._robot.fault.label}"
+
+    def measured(self) -> PrescribedMotion:
+        """Return (1, 4) position and velocity of the tool, as the arm reports them.
+
+        Raises:
+            RuntimeError: No controller answers, it is silent, or it has stopped.
+        """
+        if self._policy is not None:
+            return self._measured_by_driver(self._connect_robot())
+        stamp, pose, velocity = self._connect_reader().read()
+        now, mounting = time.monotonic(), self._mounting
         if stamp != self._stamp:
             self._stamp, self._heard = stamp, now
         elif now - self._heard > SILENT:
-            raise RuntimeError(f"robot at {self._rig.robot}: silent for {SILENT} s")
-        mounting = self._rig.mounting
+            raise RuntimeError(f"robot at {self._host}: silent for {SILENT} s")
+        if mounting is None:
+            raise RuntimeError("ur5e: measured before the first episode")
         place, way = mounting.to_table(pose), mounting.rotate_to_table(velocity)
         return np.concatenate([place[:2], way[:2]])[None]
 
+    def _measured_by_driver(self, robot: Robot) -> PrescribedMotion:
+        now = robot.get_observation()
+        if robot.state is DriverState.FAULT or not robot.is_connected:
+            raise RuntimeError(f"robot at {self._host}: {robot.fault.label}")
+        return np.array([[now.x, now.y, now.vx, now.vy]])
+
+    def _connect_reader(self) -> PoseReader:
+        """Return the arm's reader; a copy of a driver gets one of its own."""
+        if self._reader is None:
+            self._reader = PoseReader(self._host)
+            self._heard = time.monotonic()
+        return self._reader
+
+    def _connect_robot(self) -> Robot:
+        if self._robot is None:
+            config = (
+                self._rig.driver_config(self._reach)
+                if self._rig
+                else DriverConfig(self._host, _mounted(self._mounting), self._reach)
+            )
+            robot = Robot(config)
+            robot.connect()
+            robot.enable()
+            self._robot = robot
+        return self._robot
+
     def __exit__(self, *_: object) -> None:
+        if self._policy is not None:
+            self._policy.__exit__(None, None, None)
+        if self._robot is not None:
+            self._robot.disconnect()
+            self._robot = None
         if self._reader is not None:
             self._reader.close()
             self._reader = None
+
+
+def _mounted(mounting: Mounting | None) -> Mounting:
+    if mounting is None:
+        raise RuntimeError("ur5e: no episode has begun")
+    return mounting
+
+
+def _check_emulated(host: str) -> None:
+    """Refuse a controller on another machine: it may be a real arm.
+
+    Raises:
+        ValueError: It is.
+    """
+    try:
+        emulated = ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        emulated = host == "localhost"
+    if not emulated:
+        raise ValueError(
+            f"ur5e: {host} may be a real arm, and no policy moves one from a simulated "
+            "table; use --backend real"
+        )
 
 
 make = Ur5e

@@ -198,6 +198,12 @@ def _driver(name: str, given: Any, options: Mapping[str, Any]) -> Driver:
     named_make = inspect.isfunction(given) and given.__name__ == "make"
     if own_class or named_make or isinstance(given, partial):
         parameters = inspect.signature(given).parameters
+        options = {
+            option: make_agent(value)
+            if option in parameters and "Driver" in str(parameters[option].annotation)
+            else value
+            for option, value in options.items()
+        }
         for option, value in options.items():
             numeric = option in parameters and parameters[option].annotation == "float"
             if numeric and not isinstance(value, (int, float)):

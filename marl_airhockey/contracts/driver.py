@@ -40,6 +40,8 @@ class View:
     """Random streams of the driver, one for each world."""
     seat: int
     """Index of the seat: its paddle in ``state``."""
+    control_dt: float
+    """Time between two actions of the driver, s."""
     scenario_memory: Mapping[str, Array] = field(default_factory=dict)
     """Memory of the scenario, (B, *); goals in the table frame."""
     reaction: float = 0.0
@@ -73,6 +75,9 @@ class Driver:
     """True for one that a person moves, with a mouse, a gamepad or a hand."""
     needs_device: ClassVar[bool] = False
     """True for one that owns a device: a camera, a robot."""
+    commands_device: bool = False
+    """True for a position-driven one whose `act` commands the device that it measures:
+    `act` is then called before `measured`, and its action moves nothing else."""
     needs_goal: ClassVar[bool] = False
     """True for one that can only play a `GoalScenario`."""
 
@@ -100,7 +105,7 @@ class Driver:
     ) -> tuple[Array, dict[str, Array]]:
         """Return the action (B, 2), fractions of top speed, and the memory.
 
-        It is not called of a position-driven one.
+        It is not called of a position-driven one, unless that `commands_device`.
         """
         raise NotImplementedError(f"{type(self).__name__} has no act()")
 

@@ -9,16 +9,13 @@ import numpy as np
 
 from marl_airhockey.core.seat import Seat, make_seat
 from marl_airhockey.core.table import TABLES, Table
-from marl_airhockey.devices.robot.kinematics import inverse, pose_of, vector_of
+from marl_airhockey.devices.robot.kinematics import inverse, pose_of
 from marl_airhockey.devices.robot.mounting import Mounting
+from marl_airhockey.devices.robot.nominal import TILT, nominal_mounting
 from marl_airhockey.lab.ur_controller.arm import Arm
 from marl_airhockey.lab.ur_controller.plant import EmptyTable, Plant
 from marl_airhockey.types import Array
 
-BEHIND = 0.22
-"""Distance of the arm's base from the table's edge, m"""
-BELOW = 0.02
-"""Height of that edge above the base, m"""
 TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Pose of the paddle's foot in the flange's frame, m and rad"""
 ELBOW_UP = (2.9, -1.13, 1.94, -2.47, -1.57, 4.48)
@@ -35,7 +32,7 @@ class LabSetup:
 
     table: str = "full_size"
     """Name of the table's preset"""
-    tilt: float = 5.5
+    tilt: float = TILT
     """deg"""
     latency: float = 0.028
     """Time from the middle of an exposure until the picture can be had, s: half of the
@@ -59,13 +56,7 @@ class LabSetup:
     @cached_property
     def mounting(self) -> Mounting:
         """Where the table truly lies in the arm's base frame."""
-        c, s = np.cos(np.radians(self.tilt)), np.sin(np.radians(self.tilt))
-        rotation = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-        edge = np.array([BEHIND, 0.0, BELOW])
-        origin = edge + rotation @ (self.geometry.offsets[0], 0.0, 0.0)
-        # The tool's z points into the table, its x along it.
-        foot = np.column_stack([rotation[:, 0], -rotation[:, 1], -rotation[:, 2]])
-        return Mounting.of(origin, rotation, vector_of(foot))
+        return nominal_mounting(self.geometry, self.tilt)
 
     def make_table(self) -> EmptyTable:
         """Return the table under the paddle, as a plant."""

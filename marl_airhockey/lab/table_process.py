@@ -12,8 +12,9 @@ import numpy as np
 
 from marl_airhockey.devices.block import Block
 from marl_airhockey.devices.camera.camera import Frame
+from marl_airhockey.devices.robot.nominal import BEHIND
 from marl_airhockey.lab.frame_server import FrameServer
-from marl_airhockey.lab.setup import BEHIND, LabSetup
+from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.table_camera import Seen, TableCamera, lab_view
 from marl_airhockey.lab.world import RATE, LabWorld
 

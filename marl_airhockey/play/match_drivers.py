@@ -127,10 +127,10 @@ class MatchDrivers:
     def action(self, i: int) -> Array:
         """Return the action of a seat, (1, 2) fractions of top speed, ego frame.
 
-        Of one that prescribes it is 0.
+        Of one that is position-driven and commands no device it is 0.
         """
         world = self._world
-        if self._driven[i].measured() is not None:
+        if not self._driven[i].acts:
             return np.zeros((1, 2))
         return self._driven[i].act(
             world.sensed, world.memory, world.episode.physics, world.episode.cycles

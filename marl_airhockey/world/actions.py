@@ -114,11 +114,12 @@ class Actions:
             for k, measured in zip(self._open, prescribed.swapaxes(0, 1), strict=True):
                 self._position(int(k), measured)
         for seat in self._driven:
-            measured, k = seat.measured(), seat.index
-            if measured is None:
+            k = seat.index
+            if seat.acts:
                 values, cycles = episode.physics, episode.cycles
                 requested[:, k] = seat.act(sensed, memory, values, cycles)
-            else:
+            measured = seat.measured()
+            if measured is not None:
                 self._position(k, measured)
         eliminated = self._scenario.eliminated(memory)
         if eliminated is not None and eliminated.any():

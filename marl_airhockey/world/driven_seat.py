@@ -42,7 +42,7 @@ class DrivenSeat:
         self._seat = scene.seats[index]
         self._rotation = scene.table.rotation(self._seat.side)
         own = driver.control_dt or control_dt
-        self.every = round(own / control_dt)
+        self.every, self._own_dt = round(own / control_dt), own
         if self.every < 1 or abs(self.every * control_dt - own) > 1e-9:
             raise ValueError(
                 f"driver of paddle_{index}: its control_dt {own} s is not a multiple "
@@ -72,6 +72,11 @@ class DrivenSeat:
                 shape = (self._num_worlds, *row.shape[1:])
                 self._memory[name] = np.zeros(shape, row.dtype)
             self._memory[name][worlds] = row
+
+    @property
+    def acts(self) -> bool:
+        """True if `act` is to be called: for an action, or to command a device."""
+        return self.driver.commands_device or self.driver.measured() is None
 
     def measured(self) -> Array | None:
         """Return (B, 4) the measured paddle, if the driver is position-driven."""
@@ -147,6 +152,7 @@ class DrivenSeat:
             reach=np.asarray(self._seat.reach),
             rng=self._streams.of(self._purpose).select(worlds),
             seat=self.index,
+            control_dt=self._own_dt,
             scenario_memory=known,
             reaction=self._observer.reaction,
         )

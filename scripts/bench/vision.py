@@ -21,6 +21,7 @@ import numpy as np
 from marl_airhockey.backends.real.tracker import Tracker
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.devices.camera import Frame
+from marl_airhockey.devices.robot.nominal import BEHIND
 from marl_airhockey.devices.vision import Colour, Detector, Sighting
 from marl_airhockey.devices.vision.calibration import (
     find_tags,
@@ -30,7 +31,7 @@ from marl_airhockey.devices.vision.calibration import (
 )
 from marl_airhockey.devices.vision.edges import refine_corners
 from marl_airhockey.devices.vision.lens import View
-from marl_airhockey.lab.setup import BEHIND, LabSetup
+from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.table_camera import Seen, TableCamera, lab_view, tag_places
 from marl_airhockey.lab.world import RATE, LabWorld
 from marl_airhockey.types import Array
