@@ -89,11 +89,15 @@ def test_an_arm_that_hears_nothing_stops_and_its_program_ends(arm):
 
 def test_a_command_after_the_force_mode_does_not_replace_it(arm):
     """3: of two commands in one period of the controller the first is lost."""
-    for trial in range(10):
-        before = status()["commands"].get(FORCE, 0)
+
+    def pressed():
+        assert servo(arm, 0.05)
+        return status()["commands"].get(FORCE, 0)
+
+    for _ in range(10):
+        before = pressed()
         arm.press(SETUP.mounting.frame(), 5.0)
-        assert servo(arm, 0.1)
-        assert status()["commands"].get(FORCE, 0) > before, trial
+        assert until(lambda count=before: pressed() > count, 1.0)
 
 
 def test_the_last_command_is_not_run_again_after_a_restart(arm):

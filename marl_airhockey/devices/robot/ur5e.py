@@ -25,6 +25,8 @@ WATCHDOG = 10.0
 """Hz: the controller itself ends the program if commands come more rarely"""
 CYCLE = 0.006
 """Time of the controller's clock that must pass between two commands, s"""
+LONGEST = 0.2
+"""Longest wait for that, s; a robot that is silent is a fault after less"""
 ARRIVED = 0.02
 """Time after which the reason of a refusal has arrived, s"""
 STOP = 5.0
@@ -198,7 +200,7 @@ class Ur5e:
 
         Of two commands in one of its cycles it takes the last alone.
         """
-        began, until = self._receive.getTimestamp(), time.monotonic() + 0.05
+        began, until = self._receive.getTimestamp(), time.monotonic() + LONGEST
         while self._receive.getTimestamp() - began < CYCLE and time.monotonic() < until:
             time.sleep(0.0005)
 
