@@ -114,13 +114,13 @@ class Actions:
             for k, measured in zip(self._open, prescribed.swapaxes(0, 1), strict=True):
                 self._position(int(k), measured)
         for seat in self._driven:
-            k = seat.index
-            if seat.acts:
+            k, acts = seat.index, seat.acts
+            if acts:
                 values, cycles = episode.physics, episode.cycles
                 requested[:, k] = seat.act(sensed, memory, values, cycles)
             measured = seat.measured()
             if measured is not None:
-                self._position(k, measured)
+                self._position(k, measured, acts)
         eliminated = self._scenario.eliminated(memory)
         if eliminated is not None and eliminated.any():
             self._elimination.apply(eliminated, inputs)
@@ -132,15 +132,17 @@ class Actions:
         inputs.action[:] = self._delay.push(requested, delay)
         return requested
 
-    def _position(self, k: int, measured: Array) -> None:
+    def _position(self, k: int, measured: Array, acts: bool = False) -> None:
         """Put a seat's paddle where it was measured, (B, 4), ego frame.
 
-        Worlds whose row is nan keep the requested action; in all others it is 0.
+        Worlds whose row is nan keep the requested action; in all others it is 0, unless
+        the driver has commanded its device with it: ``acts``.
         """
         self._positioned = True
         action, prescribed = self.inputs.action, self.inputs.prescribed
-        given = np.isfinite(measured[:, :1])
-        action[:, k] = np.where(given, 0.0, action[:, k])
+        if not acts:
+            given = np.isfinite(measured[:, :1])
+            action[:, k] = np.where(given, 0.0, action[:, k])
         prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
         prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
 

@@ -88,6 +88,12 @@ def faults_of(caller: Caller) -> dict[str, Callable[[], None]]:
     }
 
 
+def speed_sent(robot: EmulatedRobot) -> float:
+    """Return the speed of what the driver sends, m/s."""
+    sent = robot.get_observation()
+    return float(np.hypot(sent.sent_vx, sent.sent_vy))
+
+
 def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float, ...]:
     """Return the times of braking and rest, s, and the largest decelerations."""
     robot = EmulatedRobot()
@@ -105,6 +111,7 @@ def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float,
     ]
     first = robot.now
     speed = float(np.linalg.norm(robot.true_velocity))
+    sent_speed = speed_sent(robot)
     begins = rests = joints = tool = np.nan
     while robot.now < first + LISTEN and np.isnan(rests):
         while pending and robot.now >= pending[0][0]:
@@ -116,9 +123,8 @@ def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float,
         slowing = float(np.max(np.abs(before[0]) - np.abs(after[0]))) / DT
         joints = np.fmax(joints, slowing)
         tool = np.fmax(tool, float(before[1] - after[1]) / DT)
-        sent = robot.get_observation()
         halts = isinstance(robot.controller.arm.motion, Halt)
-        slows = np.hypot(sent.sent_vx, sent.sent_vy) < 0.98 * speed
+        slows = speed_sent(robot) < 0.999 * sent_speed
         if np.isnan(begins) and (halts or slows or after[1] < 0.98 * speed):
             begins = robot.now
         if after[1] < 0.01:

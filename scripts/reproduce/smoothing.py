@@ -1,0 +1,200 @@
+"""Compare filters of commands: what they cost a policy, what they spare the arm.
+
+    python scripts/reproduce/smoothing.py
+
+A learned policy plays its task while its paddle is the tool of an emulated arm: its
+actions go through a filter (`devices/robot/filters.py`), the driver and the emulated
+controller, in emulated time. Measured are the success, the acceleration and the jerk of
+the tool as it truly moved, over 10 ms, and how often the arm ended
+in a protective stop, which fails the episode. "chatter" is the same policy with each
+component of its actions rounded to -1 or 1, a bad example on purpose. Limits "none"
+leave the filters alone; "authors" are the constants of the authors' robot code.
+
+Each cell that ends adds a row to the CSV; one whose row is there is not played again.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.seat import Seat
+from marl_airhockey.devices.robot import PRESETS, DriverState, Preset, Smoothing
+from marl_airhockey.evaluation.evaluate import TEST_SEED
+from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import build_driven_world
+
+POLICIES = {"juggle": "zoo/juggle_ur5e", "hit_goal": "zoo/hit_goal_ur5e"}
+FILTERS = (
+    Smoothing("none", 0.0),
+    Smoothing("low_pass", 0.05),
+    Smoothing("jerk_limited", 0.05),
+    Smoothing("minimum_jerk", 0.0),
+    Smoothing("minimum_jerk", 0.05),
+)
+AUTHORS = PRESETS["authors"]
+LIMITS = {
+    "ur5e": PRESETS["ur5e"],
+    "none": replace(AUTHORS, servo=replace(PRESETS["ur5e"].servo, deviation=9.0)),
+    "authors": AUTHORS,
+}
+CELLS = (
+    *itertools.product(POLICIES, ("policy", "chatter"), ("ur5e", "none"), FILTERS),
+    *itertools.product(POLICIES, ("policy", "chatter"), ("authors",), FILTERS[:1]),
+)
+SAMPLE = 0.01
+"""Time over which motion is measured, s"""
+SETUP = LabSetup(table="standard")
+COLUMNS = (
+    *("task", "commands", "limits", "filter", "time_s", "episodes", "success", "low"),
+    *("high", "acceleration_peak", "jerk_peak", "jerk_rms", "stops_per_hour"),
+)
+
+
+class EmulatedPlayer(Driver):
+    """Policy whose paddle is the tool of an emulated arm, in emulated time.
+
+    Args:
+        policy: Policy.
+        chatters: Whether each component of its actions is rounded to -1 or 1.
+        preset: Limits and settings.
+        smoothing: Filter of the commands.
+    """
+
+    needs_device = True
+    commands_device = True
+
+    def __init__(
+        self, policy: Driver, chatters: bool, preset: Preset, smoothing: Smoothing
+    ) -> None:
+        self._policy, self._chatters = policy, chatters
+        self._preset, self._smoothing = preset, smoothing
+        self.observe = policy.observe
+        self.velocities: list[Array] = []
+        """Velocities of the tool in each episode, every `SAMPLE`, (N, 2) m/s"""
+        self.stops = 0
+        """Number of protective stops"""
+        self.robot = self._start()
+
+    def _start(self) -> EmulatedRobot:
+        robot = EmulatedRobot(self._preset, self._smoothing, SETUP)
+        robot.enable()
+        for _ in range(24):
+            robot.send_action(np.zeros(2))
+            robot.advance(0.05)
+        return robot
+
+    def reset(self, seat: Seat, rng: RandomStreams, worlds: int) -> dict[str, Array]:
+        """Begin an episode with the paddle at its home position."""
+        if self.stopped or not self.robot.drive_to(self.robot.setup.home):
+            self.robot = self._start()
+        self._moved = [self.robot.true_velocity]
+        return self._policy.reset(seat, rng, worlds)
+
+    def act(
+        self, view: View, memory: dict[str, Array]
+    ) -> tuple[Array, dict[str, Array]]:
+        """Send an action to the arm and let a control step pass."""
+        action, memory = self._policy.act(view, memory)
+        if self._chatters:
+            action = np.where(action < 0.0, -1.0, 1.0)
+        self.robot.send_action(action[0] * view.top_speed[0], view.control_dt)
+        for _ in range(round(view.control_dt / SAMPLE)):
+            self.robot.advance(SAMPLE)
+            self._moved.append(self.robot.true_velocity)
+        return action, memory
+
+    def measured(self) -> PrescribedMotion:
+        """Return (1, 4) the paddle, as the arm reports it."""
+        now = self.robot.get_observation()
+        return np.array([[now.x, now.y, now.vx, now.vy]])
+
+    @property
+    def stopped(self) -> bool:
+        """True after a stop of the arm."""
+        return self.robot.state in (DriverState.HOLD, DriverState.FAULT)
+
+    def end(self) -> None:
+        """Keep what an episode measured."""
+        self.velocities.append(np.array(self._moved))
+        self.stops += self.stopped
+
+
+def play(task: str, player: EmulatedPlayer, episodes: int) -> int:
+    """Return the number of successes; an episode in which the arm stops is none."""
+    world = build_driven_world(player, task, 1, {"profile": "ur5e"})
+    successes = 0
+    for episode in range(episodes):
+        world.reset(TEST_SEED + episode)
+        ended = False
+        while not (ended or player.stopped):
+            result = world.step(np.zeros((1, 0, 2)))
+            ended = bool(result.terminated[0] | result.truncated[0])
+        successes += bool(ended and world.episode.success[0, 0])
+        player.end()
+    world.close()
+    return successes
+
+
+def measure(
+    task: str, commands: str, limits: str, smoothing: Smoothing, episodes: int
+) -> dict[str, str | int]:
+    """Return the row of a cell."""
+    policy = load_policy(POLICIES[task])
+    chatters = commands == "chatter"
+    player = EmulatedPlayer(policy, chatters, LIMITS[limits], smoothing)
+    successes = play(task, player, episodes)
+    low, high = interval(successes / episodes, episodes)
+    accelerations = [np.diff(v, axis=0) / SAMPLE for v in player.velocities]
+    jerks = [np.diff(a, axis=0) / SAMPLE for a in accelerations]
+    sizes = np.concatenate([np.linalg.norm(j, axis=1) for j in jerks])
+    hours = sum(map(len, player.velocities)) * SAMPLE / 3600.0
+    largest = max(np.linalg.norm(a, axis=1).max() for a in accelerations)
+    return {
+        "episodes": episodes,
+        "success": f"{successes / episodes:.3f}",
+        "low": f"{low:.3f}",
+        "high": f"{high:.3f}",
+        "acceleration_peak": f"{largest:.1f}",
+        "jerk_peak": f"{sizes.max():.0f}",
+        "jerk_rms": f"{np.sqrt((sizes**2).mean()):.0f}",
+        "stops_per_hour": f"{player.stops / hours:.0f}",
+    }
+
+
+def main(
+    episodes: Annotated[int, typer.Option(help="Episodes of each cell.")] = 50,
+    out: Annotated[Path, typer.Option(help="CSV of the rows.")] = Path(
+        "docs/data/smoothing.csv"
+    ),
+) -> None:
+    """Play the cells whose rows are missing and print all rows."""
+    rows = [*csv.DictReader(out.open())] if out.exists() else []
+    known = {tuple(row[name] for name in COLUMNS[:5]) for row in rows}
+    for task, commands, limits, smoothing in CELLS:
+        cell = task, commands, limits, smoothing.name, f"{smoothing.time:g}"
+        if cell in known:
+            continue
+        row = measure(task, commands, limits, smoothing, episodes)
+        with out.open("a", newline="") as file:
+            table = csv.DictWriter(file, COLUMNS)
+            if not file.tell():
+                table.writeheader()
+            table.writerow(dict(zip(COLUMNS[:5], cell, strict=True)) | row)
+        print(*cell, *row.values(), flush=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)
