@@ -1,172 +1,266 @@
-"""Measure how the arm of the virtual lab comes to rest, for each fault.
+"""Measure in real time how an arm comes to rest, for faults and killed processes.
 
-    python scripts/bench/stops.py
+    python scripts/bench/stops.py --out docs/data/stops.json
 
-The paddle moves at 0.5 m/s when a fault is switched on, or a process is killed. The
-lab tells the truth of its paddle. Printed are the longest times from then until the
-driver begins to brake (where it is the one that does), until the true paddle is slower
-by a tenth, and until it rests (0.01 m/s), and the largest deceleration in between, over
-some tries. Commands that fail to come count from the last one. ``--smoothing`` is that
-of a rig: it is in what a policy commands, and in no stop of the driver's own.
+A caller, in a process of its own, commands 0.5 m/s 20 times a second; the driver is
+another process, with the real client; the lab's controller is a third. Then a fault is
+switched on, or one of the processes is killed. The lab tells the truth of its paddle.
+Printed are medians and worst values over the trials: the times until the driver begins
+to brake (where it is the one that does), until the paddle is slower by a tenth, and
+until it rests (0.01 m/s), and the largest deceleration, over 10 ms. A new command, and
+commands that stop, count from the command. `stops_emulated.py` measures the same in
+emulated time, for pairs of faults, too.
+
+Nothing else should run meanwhile; it takes about 25 minutes.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import multiprocessing
 import os
 import signal
-import threading
 import time
 from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.devices.robot import DriverConfig, Robot, Smoothing
+from marl_airhockey.devices.robot import DriverConfig, DriverState, Robot
 from marl_airhockey.lab.lab import Lab
 from marl_airhockey.types import Array
 
 SPEED = 0.5
 """m/s"""
-LISTEN = 1.0
-"""Time for which the truth is listened to, s"""
+CONTROL_DT = 0.05
+"""Time between two commands, s"""
+LISTEN = 3.0
+"""Longest time for which the truth is listened to, s"""
+STILL = 0.01
+"""Speed below which the paddle rests, m/s"""
+ANSWER = 40.0
+"""Longest time until a caller has its paddle in motion, s"""
 UP = np.array([0.0, SPEED])
-REST = np.zeros(2)
-Case = tuple[Callable[[Robot], None], Callable[[], None], Array | None]
-"""What lets something go wrong, what lets it be right again, and the velocity that is
-commanded meanwhile; None for no commands"""
+FAULTS = (
+    *("protective_stop", "emergency_stop", "silent_robot", "delayed_packets"),
+    *("dropped_connection", "loss_of_real_time", "puck_under_paddle"),
+    *("speed_slider", "power_off"),
+)
+MEASURES = ("driver_brakes_s", "slower_s", "rest_s", "deceleration_m_s2")
 
 
-def drive(robot: Robot, seconds: float) -> None:
-    """Command a velocity for a while, 20 times a second."""
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        robot.send_action(UP, 0.05)
-        time.sleep(0.05)
+class Report(NamedTuple):
+    """Report of a caller."""
+
+    commanded_at: float
+    """Time of the first command that was another, or of the last one, s"""
+    braked_at: float
+    """Time at which the driver began to brake of its own, s"""
 
 
-def listen(lab: Lab, seconds: float) -> Array:
-    """Return rows of time, x, y, vx, vy of the paddle, as it truly is."""
-    rows, until = [], time.monotonic() + seconds
-    while time.monotonic() < until:
+def run_caller(config: DriverConfig, start: Array, pipe: Connection) -> None:
+    """Command a velocity until the pipe says which other, or None for no more."""
+    with Robot(config) as robot:
+        while robot.state is DriverState.FAULT:
+            time.sleep(5.5)
+            robot.recover()
+        robot.go_to(start)
+        command: Array | None = UP
+        begun = time.monotonic()
+        changed_at = told = 0.0
+        while True:
+            if command is not None:
+                robot.send_action(command, CONTROL_DT)
+                changed_at = changed_at or robot.commanded_at * (command is not UP)
+            if not told and time.monotonic() > begun + 0.35:
+                pipe.send(robot.pid)
+                told = True
+            if not pipe.poll(CONTROL_DT):
+                continue
+            order = pipe.recv()
+            if isinstance(order, str):
+                now = robot.get_observation()
+                pipe.send(Report(changed_at or robot.commanded_at, now.braked_at))
+                return
+            command = order
+
+
+class Trial:
+    """Trial: a paddle in motion, and the processes that move it.
+
+    Args:
+        lab: Lab whose arm it is.
+    """
+
+    def __init__(self, lab: Lab) -> None:
+        self.lab, setup = lab, lab.setup
+        config = DriverConfig(lab.host, setup.mounting, setup.seat.reach)
+        context = multiprocessing.get_context("spawn")
+        self._pipe, end = context.Pipe()
+        start = setup.home - (0.0, 0.2)
+        self.caller = context.Process(target=run_caller, args=(config, start, end))
+        self.caller.start()
+        end.close()
+        if not self._pipe.poll(ANSWER):
+            raise RuntimeError("the caller's paddle does not move")
+        self.driver_pid = int(self._pipe.recv())
+
+    def command(self, velocity: Array | None) -> None:
+        """Let the caller command another velocity (2,), m/s; None for no more."""
+        self._pipe.send(velocity)
+
+    def end(self) -> Report:
+        """End the caller and return its report; nan from a dead one."""
+        try:
+            self._pipe.send("end")
+            report = Report(*self._pipe.recv())
+        except (OSError, EOFError):
+            report = Report(np.nan, np.nan)
+        self.caller.join()
+        return report
+
+
+def listen(lab: Lab) -> Array:
+    """Return rows of time, x, y, vx, vy of the paddle, as it truly is, until it rests.
+
+    The first 0.3 s are always there: it may begin to brake late.
+    """
+    rows, begin = [], time.monotonic()
+    while time.monotonic() < begin + LISTEN:
         truth = lab.ask({"do": "truth"})
         rows.append([truth["time"], *np.array(truth["paddle"])[[0, 1, 3, 4]]])
+        if np.hypot(*rows[-1][3:]) < STILL and time.monotonic() > begin + 0.3:
+            break
         time.sleep(0.002)
     return np.array(rows)
 
 
 def judge(rows: Array, since: float, braked_at: float) -> tuple[float, ...]:
-    """Return the times of braking and rest, s after a moment, and the deceleration."""
+    """Return the `MEASURES`; nan for what there is not."""
     speed, t = np.linalg.norm(rows[:, 3:], axis=1), rows[:, 0]
     brakes = t[(t > since) & (speed < 0.9 * SPEED)]
-    rests = t[(t > since) & (speed < 0.01)]
-    # Over 10 ms: the lab tells what its controller has published last.
-    fine = np.arange(since, since + LISTEN, 0.01)
-    slowing = -np.diff(np.interp(fine, t, speed)) / 0.01
-    if not len(brakes) or not len(rests):
-        return (np.nan,) * 4
+    rests = t[(t > since) & (speed < STILL)]
     asked = braked_at - since if braked_at > since else np.nan
+    if not len(brakes) or not len(rests):
+        return asked, np.nan, np.nan, np.nan
+    # Over 10 ms: the lab tells what its controller has published last.
+    fine = np.arange(since, rests[0] + 0.01, 0.01)
+    slowing = -np.diff(np.interp(fine, t, speed)) / 0.01
     return asked, brakes[0] - since, rests[0] - since, float(slowing.max())
 
 
-def measure(
-    lab: Lab,
-    smoothing: float,
-    act: Callable[[Robot], None],
-    undo: Callable[[], None],
-    wanted: Array | None,
-) -> tuple[float, ...]:
-    """Return what `judge` says of one try.
+class Bench:
+    """Bench of trials, with a lab that is opened again when its controller is dead."""
 
-    Args:
-        lab: that runs.
-        smoothing: of commands, s.
-        act: lets something go wrong.
-        undo: lets it be right again.
-        wanted: velocity that is commanded meanwhile, m/s; None for no commands.
-    """
-    setup = lab.setup
-    config = DriverConfig(
-        *(lab.host, setup.mounting, setup.seat.reach),
-        smoothing=Smoothing("low_pass", smoothing),
-    )
-    with Robot(config) as robot:
-        while robot.state.name == "FAULT":
-            time.sleep(5.5)
-            robot.recover()
-        robot.go_to(setup.home - (0.0, 0.2))
-        drive(robot, 0.35)
-        since = robot.commanded_at if wanted is None else time.monotonic()
-        act(robot)
-        going = threading.Event()
+    def __init__(self) -> None:
+        self.lab = Lab()
 
-        def go_on() -> None:
-            while wanted is not None and not going.wait(0.05):
-                robot.send_action(wanted, 0.05)
+    def fault(self, name: str) -> Callable[[Trial], None]:
+        """Return what switches a fault on."""
+        return lambda trial: self._switch(name, True)
 
-        thread = threading.Thread(target=go_on)
-        thread.start()
-        rows = listen(lab, LISTEN)
-        going.set()
-        thread.join()
-        undo()
-        return judge(rows, since, robot.get_observation().braked_at)
+    def _switch(self, name: str, on: bool) -> None:
+        self.lab.ask({"do": "fault", "name": name, "on": on})
+
+    def kill_controller(self, trial: Trial) -> None:
+        """Kill the process of the lab's arm."""
+        os.kill(self.lab.ask({"do": "info"})["pids"][0], signal.SIGKILL)
+
+    def clear(self) -> None:
+        """Switch all faults off."""
+        if all(self.lab.alive):
+            for name in FAULTS:
+                self._switch(name, False)
+            return
+        self.lab.close()
+        self.lab = Lab()
+
+    def measure(
+        self, act: Callable[[Trial], None], of_command: bool
+    ) -> tuple[float, ...]:
+        """Return the `MEASURES` of one trial.
+
+        Args:
+            act: Function that lets something go wrong.
+            of_command: Whether times count from the command.
+        """
+        trial = Trial(self.lab)
+        since = time.monotonic()
+        act(trial)
+        rows = listen(self.lab)
+        report = trial.end()
+        self.clear()
+        begin = report.commanded_at if of_command else since
+        return judge(rows, begin, report.braked_at)
+
+
+def kill_caller(trial: Trial) -> None:
+    """Kill the caller."""
+    trial.caller.kill()
+
+
+def kill_driver(trial: Trial) -> None:
+    """Kill the driver."""
+    os.kill(trial.driver_pid, signal.SIGKILL)
+
+
+def summarize(case: str, values: Array) -> dict[str, object]:
+    """Return the row of a case: medians and worst values, None where there are none."""
+
+    def number(x: float) -> float | None:
+        return None if np.isnan(x) else round(float(x), 4)
+
+    row: dict[str, object] = {"case": case, "trials": len(values)}
+    for name, column in zip(MEASURES, values.T, strict=True):
+        known = column[~np.isnan(column)]
+        median, worst = (np.median(known), known.max()) if len(known) else (np.nan,) * 2
+        row[name] = {"median": number(median), "worst": number(worst)}
+    return row
+
+
+def show(row: dict[str, object]) -> None:
+    """Print a row of the table."""
+    cells = []
+    for name in MEASURES:
+        pair = row[name]
+        assert isinstance(pair, dict)
+        scale, form = (1.0, "{:.1f}") if name.endswith("s2") else (1e3, "{:.0f}")
+        known = [x for x in pair.values() if x is not None]
+        cells.append(" / ".join(form.format(scale * x) for x in known))
+    print(f"| {row['case']} | " + " | ".join(cells) + " |", flush=True)
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--tries", type=int, default=5)
-    parser.add_argument("--smoothing", type=float, default=0.0, help="s")
+    parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--out", type=Path, help="file for the rows, JSON")
     given = parser.parse_args()
-    tries = given.tries
-    with Lab() as lab:
-
-        def fault(name: str) -> Case:
-            order = {"do": "fault", "name": name}
-
-            def act(robot: Robot) -> None:
-                lab.ask({**order, "on": True})
-
-            def undo() -> None:
-                lab.ask({**order, "on": False})
-
-            return act, undo, UP
-
-        def kill(robot: Robot) -> None:
-            assert robot.pid is not None
-            os.kill(robot.pid, signal.SIGKILL)
-
-        cases: dict[str, Case] = {
-            "a command to rest": (
-                *(lambda robot: robot.send_action(REST, 0.05), lambda: None),
-                REST,
-            ),
-            "commands fail to come": (lambda robot: None, lambda: None, None),
-            "the driver is killed": (kill, lambda: None, UP),
-            **{
-                name.replace("_", " "): fault(name)
-                for name in (
-                    *("protective_stop", "emergency_stop", "silent_robot"),
-                    *("delayed_packets", "puck_under_paddle"),
-                )
-            },
-        }
-        print(
-            f"{'longest of ' + str(tries):24} driver   slower   at rest   deceleration"
-        )
+    bench = Bench()
+    cases: dict[str, tuple[Callable[[Trial], None], bool]] = {
+        "a command to rest": (lambda trial: trial.command(np.zeros(2)), True),
+        "commands stop": (lambda trial: trial.command(None), True),
+        "the caller is killed": (kill_caller, False),
+        "the driver is killed": (kill_driver, False),
+        "the controller is killed": (bench.kill_controller, False),
+        **{name: (bench.fault(name), False) for name in FAULTS},
+    }
+    columns = "driver brakes, ms", "a tenth slower, ms", "at rest, ms", "m/s2"
+    print(f"| | {' | '.join(columns)} |")
+    print("| --- | --- | --- | --- | --- |")
+    rows = []
+    try:
         for name, case in cases.items():
-            rows = np.array(
-                [measure(lab, given.smoothing, *case) for _ in range(tries)]
-            )
-            asked, slower, rests = (f"{1e3 * x:.0f} ms" for x in most(rows[:, :3]))
-            slowing = f"{most(rows)[3]:.1f} m/s2"
-            print(f"{name:24} {asked:>6} {slower:>8} {rests:>9} {slowing:>14}")
-
-
-def most(rows: Array) -> Array:
-    """Return the largest number in each column; nan where there is none."""
-    filled = np.where(np.isnan(rows), -np.inf, rows).max(0)
-    return np.where(np.isinf(filled), np.nan, filled)
+            values = [bench.measure(*case) for _ in range(given.trials)]
+            rows.append(summarize(name, np.array(values)))
+            show(rows[-1])
+    finally:
+        bench.lab.close()
+    if given.out:
+        given.out.write_text(json.dumps(rows, indent=1) + "\n")
 
 
 if __name__ == "__main__":

@@ -118,6 +118,7 @@ class MinimumJerk:
 
     From a velocity and an acceleration to the commanded velocity without acceleration
     that is a cubic polynomial of time, over the rest of the control step and ``time``.
+    As each command plans anew, a step is passed by up to 2 % before it is reached.
 
     Args:
         dt: Time of a cycle, s.

@@ -1,0 +1,186 @@
+"""Measure how an arm tracks commands: a circle at 0.7 m/s, 20 commands a second.
+
+    python scripts/bench/tracking.py --out docs/data/tracking.csv \
+        --plot docs/images/tracking.png
+
+The reference is the path of the commands themselves: velocities that are reached by
+linear ramps of 50 ms. The latency is the delay of the reference at which the paddle, as
+it truly moved, is closest to it; the tracking error is what is left then. In emulated
+time all is in one process; in real time the caller, the driver with the real client and
+the lab's controller are processes, with all their delays.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import typer
+
+from marl_airhockey.devices.robot import DriverConfig, Robot, Smoothing
+from marl_airhockey.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.lab.lab import Lab
+from marl_airhockey.types import Array
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+SPEED, RADIUS = 0.7, 0.12
+CONTROL_DT = 0.05
+RAMP, SECONDS = 1.0, 8.0
+"""Time in which the circle comes to its speed, and time of all, s"""
+FILTERS = (
+    Smoothing("none", 0.0),
+    Smoothing("low_pass", 0.05),
+    Smoothing("jerk_limited", 0.05),
+    Smoothing("minimum_jerk", 0.0),
+    Smoothing("minimum_jerk", 0.05),
+)
+
+
+class Record(NamedTuple):
+    """Record of a motion."""
+
+    commands: Array
+    """(n, 3) time, s, and velocity, m/s, of each command"""
+    paddle: Array
+    """(m, 3) time, s, and position, m, of the paddle as it truly was"""
+
+
+def velocity_at(t: float) -> Array:
+    """Return the velocity (2,), m/s, that a command asks for at a time."""
+    speed = SPEED * min(t / RAMP, 1.0)
+    path = SPEED * (0.5 * t**2 / RAMP if t < RAMP else t - 0.5 * RAMP)
+    angle = path / RADIUS
+    return speed * np.array([-np.sin(angle), np.cos(angle)])
+
+
+def start_in(reach: tuple[tuple[float, float], ...]) -> Array:
+    """Return the position (2,), m, at which the circle in the middle begins."""
+    x, y = 0.5 * (np.min(reach, 0) + np.max(reach, 0))
+    return np.array([x + RADIUS, y])
+
+
+def in_emulated_time(smoothing: Smoothing) -> Record:
+    """Return the record of an emulated robot."""
+    robot = EmulatedRobot(smoothing=smoothing)
+    robot.enable()
+    assert robot.drive_to(start_in(robot.setup.seat.reach))
+    commands, paddle, begin = [], [], robot.now
+    while robot.now < begin + SECONDS:
+        velocity = velocity_at(robot.now - begin + CONTROL_DT)
+        commands.append([robot.now, *velocity])
+        robot.send_action(velocity, CONTROL_DT)
+        for _ in range(25):
+            robot.advance(0.002)
+            paddle.append([robot.now, *robot.true_position[:2]])
+    return Record(np.array(commands), np.array(paddle))
+
+
+def in_real_time(lab: Lab, smoothing: Smoothing) -> Record:
+    """Return the record of a robot whose driver and controller are processes."""
+    setup = lab.setup
+    config = DriverConfig(
+        *(lab.host, setup.mounting, setup.seat.reach), smoothing=smoothing
+    )
+    commands, paddle = [], []
+    with Robot(config) as robot:
+        robot.go_to(start_in(setup.seat.reach))
+        begin = due = time.monotonic()
+        while time.monotonic() < begin + SECONDS:
+            if time.monotonic() >= due:
+                velocity = velocity_at(due - begin + CONTROL_DT)
+                robot.send_action(velocity, CONTROL_DT)
+                commands.append([robot.commanded_at, *velocity])
+                due += CONTROL_DT
+            truth = lab.ask({"do": "truth"})
+            paddle.append([truth["time"], *truth["paddle"][:2]])
+            time.sleep(0.002)
+    return Record(np.array(commands), np.array(paddle))
+
+
+def reference_of(record: Record, times: Array) -> Array:
+    """Return the positions (n, 2) of the commands' path at some times, m."""
+    fine = np.arange(record.commands[0, 0], times[-1], 0.001)
+    sent, velocity = record.commands[:, 0], record.commands[:, 1:]
+    before = np.vstack([np.zeros(2), velocity[:-1]])
+    k = np.searchsorted(sent, fine, side="right") - 1
+    share = np.clip((fine - sent[k]) / CONTROL_DT, 0.0, 1.0)[:, None]
+    speeds = before[k] + share * (velocity[k] - before[k])
+    path = record.paddle[0, 1:] + np.cumsum(speeds, 0) * 0.001
+    return np.stack([np.interp(times, fine, axis) for axis in path.T], 1)
+
+
+def judge(record: Record) -> tuple[float, float, float]:
+    """Return the latency, s, and the tracking error, RMS and largest, m."""
+    times, paddle = record.paddle[:, 0], record.paddle[:, 1:]
+    steady = times > times[0] + RAMP + 0.5
+
+    def errors(latency: float) -> Array:
+        off = paddle - reference_of(record, times - latency)
+        return np.asarray(np.linalg.norm(off[steady], axis=1))
+
+    latency = min(
+        np.arange(0.0, 0.3, 0.001), key=lambda delay: float(np.mean(errors(delay) ** 2))
+    )
+    left = errors(latency)
+    return float(latency), float(np.sqrt(np.mean(left**2))), float(left.max())
+
+
+def draw(record: Record, latency: float, file: Path) -> None:
+    """Draw two seconds of a record."""
+    times, paddle = record.paddle[:, 0], record.paddle[:, 1:]
+    some = (times > times[0] + 3.0) & (times < times[0] + 5.0)
+    reference = reference_of(record, times)
+    late = reference_of(record, times - latency)
+    t = times[some] - times[some][0]
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(10, 3.6), layout="constrained", width_ratios=(2.2, 1)
+    )
+    left.plot(t, 1e3 * reference[some, 1], color="0.6", label="path of the commands")
+    left.plot(t, 1e3 * paddle[some, 1], color="tab:blue", label="paddle")
+    left.set(xlabel="time, s", ylabel="y, mm")
+    left.legend(loc="upper right")
+    right.plot(*1e3 * (late[some] - late[some].mean(0)).T, color="0.6")
+    right.plot(*1e3 * (paddle[some] - late[some].mean(0)).T, color="tab:blue")
+    right.set(xlabel="x, mm", ylabel="y, mm", aspect="equal")
+    right.set_title(f"the path {1e3 * latency:.0f} ms late", fontsize=10)
+    figure.savefig(file, dpi=110)
+    plt.close(figure)
+
+
+def main(
+    out: Annotated[Path | None, typer.Option(help="CSV of the rows.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="PNG of the motion.")] = None,
+) -> None:
+    """Measure every filter in emulated and in real time, and print a table."""
+    rows = []
+    print("| filter | time, s | clock | latency, ms | error, mm (RMS / largest) |")
+    print("| --- | --- | --- | --- | --- |")
+    with Lab() as lab:
+        for clock in ("emulated", "real"):
+            for smoothing in FILTERS:
+                record = (
+                    in_emulated_time(smoothing)
+                    if clock == "emulated"
+                    else in_real_time(lab, smoothing)
+                )
+                latency, error, largest = judge(record)
+                if plot and clock == "real" and smoothing == FILTERS[0]:
+                    draw(record, latency, plot)
+                case = smoothing.name, f"{smoothing.time:g}", clock
+                found = f"{1e3 * latency:.0f}", f"{1e3 * error:.1f}"
+                rows.append((*case, *found, f"{1e3 * largest:.1f}"))
+                print(f"| {' | '.join(rows[-1][:4])} | {' / '.join(rows[-1][4:])} |")
+    if out:
+        with out.open("w", newline="") as file:
+            names = "filter", "time_s", "clock", "latency_ms", "rms_mm", "largest_mm"
+            csv.writer(file).writerows([names, *rows])
+
+
+if __name__ == "__main__":
+    typer.run(main)
