@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.core.seat import Seat, make_seat
 from marl_airhockey.core.table import TABLES, Table
 from marl_airhockey.devices.robot.kinematics import inverse, pose_of
@@ -68,7 +69,12 @@ class LabSetup:
 
         Args:
             plant: What the paddle touches; None for an empty table.
+
+        Raises:
+            RuntimeError: scipy is missing, with the command that installs it.
+            ValueError: The arm does not reach its table.
         """
+        require("scipy", "hardware")
         pose = pose_of(self.mounting.pose(self.home, LIFT))
         flange = pose @ np.linalg.inv(pose_of(np.array(TOOL)))
         found, angles = inverse(flange, np.array(ELBOW_UP), 200)
