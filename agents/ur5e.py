@@ -59,7 +59,7 @@ class Ur5e(Driver):
         self._policy = policy
         if policy is not None:
             self.commands_device, self.observe = True, policy.observe
-            self.control_dt = policy.control_dt
+            self.control_dt, self.trained_in = policy.control_dt, policy.trained_in
             _check_emulated(self._host)
         self._reach: tuple[tuple[float, float], ...] = ()
         self._mounting = self._rig.mounting if self._rig else None

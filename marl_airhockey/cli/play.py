@@ -71,9 +71,11 @@ def play(
         str | None,
         typer.Option(help="Who sits at all other seats; of the zoo if it has one."),
     ] = None,
-    seat: Annotated[
+    driver: Annotated[
         list[str] | None,
-        typer.Option(help="Who sits at one seat, AGENT=NAME; person for people."),
+        typer.Option(
+            help="Who drives one seat, AGENT=NAME, person for people; repeatable."
+        ),
     ] = None,
     backend: Backend = DEFAULT_BACKEND,
     profile: Profile = None,
@@ -99,7 +101,7 @@ def play(
 
     kind = RealMatch if backend == REAL else LiveMatch
     keywords = environment(backend, profile, option, None, control_dt=kind.CONTROL_DT)
-    seats = settings(seat)
+    seats = settings(driver)
     keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
     handicap = Handicap(reaction / 1000.0, noise, pace)
     with real_table(keywords, lab, rig) as table:
@@ -202,7 +204,7 @@ def seat_drivers(match: LiveMatch, opponent: str | None, seats: dict[str, Any]) 
         match.set_driver(i, chosen.pop(agent, PERSON if i == 0 else rest))
     if chosen:
         scenario = match.world.scenario.name
-        raise ValueError(f"--seat: {scenario} has no {', '.join(chosen)}")
+        raise ValueError(f"--driver: {scenario} has no {', '.join(chosen)}")
 
 
 def show(recording: Path, host: str, port: int, browser: bool) -> None:

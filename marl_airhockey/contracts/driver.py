@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import TracebackType
-from typing import ClassVar, Self
+from types import MappingProxyType, TracebackType
+from typing import Any, ClassVar, Self
 
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
@@ -69,6 +69,9 @@ class Driver:
     """Form of the driver's observations; None for the environment's."""
     control_dt: float | None = None
     """Time between two actions, s, a multiple of the environment's; None: the same."""
+    trained_in: Mapping[str, Any] = MappingProxyType({})
+    """Environment in which its policy was trained, as far as it is known, see
+    `policies.policy.trained_in`"""
     erratic: ClassVar[bool] = False
     """True for one that must never move a real arm."""
     needs_person: ClassVar[bool] = False

@@ -44,7 +44,7 @@ def as_trained(
     known = {
         name: player.trained_in
         for name, player in players.items()
-        if isinstance(player, Policy) and player.trained_in
+        if player.trained_in
     }
     if scenario is None:
         scenario = _agreed("scenario", known)

@@ -76,7 +76,7 @@ class HandicappedDriver(Driver):
 
     def __post_init__(self) -> None:
         self.observe = self.inner.observe
-        trained = getattr(self.inner, "trained_in", {}).get("control_dt")
+        trained = self.inner.trained_in.get("control_dt")
         self.control_dt = self.inner.control_dt or trained or 0.05
         self._delay = round(self.handicap.reaction / self.control_dt)
 

@@ -43,7 +43,6 @@ class Policy(Driver):
     can_sample: bool = True
     """False if it has a mean action alone, as ONNX models"""
     trained_in: Mapping[str, Any] = field(default_factory=dict)
-    """Environment of its training, as far as it is known, see `trained_in`"""
 
     def act(
         self, view: View, memory: dict[str, Array]

@@ -144,7 +144,7 @@ def main(
         ("1 player", [], 1, 0),
         (
             f"2 players, {watchers} watchers",
-            ["--seat", "paddle_1=person"],
+            ["--driver", "paddle_1=person"],
             2,
             watchers,
         ),

@@ -101,3 +101,68 @@ def test_ladders_have_the_ratings_of_their_files(game):
     assert len(ladder) == len(rows)
     for cells, known in zip(rows, ladder, strict=True):
         assert float(cells[column]) == pytest.approx(float(known["elo"]), abs=0.6)
+
+
+def pairs_of(cell):
+    """Numbers of a cell "median / worst"; none of an empty one."""
+    return [float(x) for x in cell.split("/") if x.strip()]
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "first", "columns"),
+    [
+        (
+            "stops.json",
+            "case",
+            "driver brakes, ms",
+            [
+                ("driver brakes, ms", "driver_brakes_s", 1e3),
+                ("a tenth slower, ms", "slower_s", 1e3),
+                ("at rest, ms", "rest_s", 1e3),
+                ("m/s2", "deceleration_m_s2", 1.0),
+            ],
+        ),
+        (
+            "stops_emulated.json",
+            "faults",
+            "braking begins, ms",
+            [
+                ("braking begins, ms", "begins_s", 1e3),
+                ("at rest, ms", "rest_s", 1e3),
+                ("joint, rad/s2", "joint_rad_s2", 1.0),
+                ("tool, m/s2", "tool_m_s2", 1.0),
+            ],
+        ),
+    ],
+)
+def test_stops_are_those_of_their_rows(name, key, first, columns):
+    rows = {row[key]: row for row in json.loads((DATA / name).read_text())}
+    for shown in table("docs/robot.md", first):
+        case = next(iter(shown.values())).strip("`")
+        if case == "worst of all pairs":
+            pairs = [row for case, row in rows.items() if "+" in case]
+            for title, column, scale in columns:
+                worst = scale * max(row[column]["worst"] for row in pairs)
+                assert float(shown[title]) == pytest.approx(worst, abs=0.51), title
+            continue
+        for title, column, scale in columns:
+            known = [x for x in rows[case][column].values() if x is not None]
+            expected = [scale * x for x in known]
+            found = pairs_of(shown[title])
+            assert found == pytest.approx(expected, abs=0.51), (case, title)
+
+
+def test_tracking_and_filters_are_those_of_their_rows():
+    rows = rows_of("tracking.csv")
+    for shown in table("docs/robot.md", "latency, ms"):
+        row = next(
+            r
+            for r in rows
+            if (r["filter"], r["time_s"], r["clock"])
+            == (shown["filter"], shown["time, s"], shown["clock"])
+        )
+        assert shown["latency, ms"] == row["latency_ms"]
+        assert pairs_of(shown["error, mm"]) == [
+            float(row["rms_mm"]),
+            float(row["largest_mm"]),
+        ]

@@ -54,3 +54,7 @@ def test_a_seat_that_is_no_robots_is_refused():
     drivers = {"paddle_0": twin, "paddle_1": "still"}
     with pytest.raises(ValueError, match="no robot's"):
         ah.make_world("duel", 1, drivers=drivers).reset(0)
+
+
+def test_its_environment_is_that_of_the_policy():
+    assert make_agent(TWIN).trained_in["profile"] == "ur5e"
