@@ -14,6 +14,8 @@ from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import REAL, name_on_table, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.lab.faults import FAULTS
+from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.registry import find_backend
 from marl_airhockey.world.build import Keywords
 
 GAME, PLAYER = "juggle", "zoo/juggle"
@@ -29,6 +31,9 @@ def open_lab(
     frame_rate: Annotated[
         float, typer.Option(help="Pictures a second.", min=1.0, max=60.0)
     ] = 30.0,
+    plant: Annotated[
+        str, typer.Option(help="Backend that moves the puck: numba, pymunk, robosuite.")
+    ] = LabSetup.plant,
     demo: Annotated[
         bool, typer.Option("--demo", help="Let the learned juggler play, on a page.")
     ] = False,
@@ -44,12 +49,15 @@ def open_lab(
         return
     from marl_airhockey.lab.lab import Lab, LabClient, served
 
+    if plant == REAL:
+        raise ValueError("--plant real: the lab is what stands in for a real table")
+    find_backend(plant)
     running = LabClient.find()
     if running is not None:
         running.close()
         raise RuntimeError("lab: one is running already; end it first")
     with waiting("opening the lab (longer when it is the first time)"):
-        opened = Lab(seed=seed, frame_rate=frame_rate)
+        opened = Lab(LabSetup(plant=plant), seed, frame_rate)
     # Ctrl+C may come as soon as the door is open, so it is caught around all of it.
     with contextlib.suppress(KeyboardInterrupt), opened, served(opened):
         if demo:
@@ -71,7 +79,7 @@ def show_demo(host: str, port: int, browser: bool) -> None:
     require("uvicorn", "play")
     from marl_airhockey.play.real_match import RealMatch
 
-    keywords: Keywords = {"backend": REAL, "profile": "ideal"}
+    keywords: Keywords = {"backend": REAL}
     with real_table(keywords, True, None) as table:
         match = RealMatch(GAME, {"paddle_0": name_on_table(PLAYER, REAL)}, table)
         match.again = True

@@ -10,9 +10,8 @@ from typing import Annotated
 import typer
 
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.devices.rig import Rig
 from marl_airhockey.registry import zoo_names
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.build import Keywords, table_keywords
 
 REAL = "real"
 """Name of the backend that is a real table"""
@@ -57,7 +56,7 @@ def real_table(keywords: Keywords, lab: bool, rig: Path | None) -> Iterator[Keyw
         yield keywords
     else:
         with rig_of(lab, rig) as path:
-            yield _on_table(keywords, path)
+            yield table_keywords({**keywords, "rig": str(path)})
 
 
 @contextmanager
@@ -88,15 +87,3 @@ def rig_of(lab: bool, rig: Path | None) -> Iterator[Path]:
         yield path
     finally:
         opened.__exit__(None, None, None)
-
-
-def _on_table(keywords: Keywords, path: Path) -> Keywords:
-    """Return keywords with a rig, its table, and the profile of its robot."""
-    options = {"table": Rig.load(path).table, **keywords.get("options", {})}
-    profile = keywords.get("profile", "ideal")
-    return {
-        **keywords,
-        "rig": str(path),
-        "options": options,
-        "profile": "ur5e" if profile == "ideal" else profile,
-    }

@@ -141,6 +141,17 @@ class Backend(ABC):
         """
         self._before = state
 
+    @classmethod
+    def table_of(cls, rig: str) -> tuple[str, str] | None:
+        """Return the names of the table of a rig and of its robot's profile.
+
+        None for a simulation.
+
+        Raises:
+            ValueError: The file is wrong.
+        """
+        return None
+
     def connect(self, rig: str) -> None:
         """Connect to the devices of a real table, which a file describes.
 

@@ -17,11 +17,9 @@ from marl_airhockey.devices.camera.film import read_times
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.devices.rig_file import rig_fields
 from marl_airhockey.devices.vision import Detector
-from marl_airhockey.devices.vision.calibration import find_tags, moved
+from marl_airhockey.devices.vision.calibration import view_trouble
 from marl_airhockey.types import Array
 
-MOVED = 2.0
-"""Error of the tags, px, at which the camera is not where it was calibrated"""
 LOOKED = 5
 """Number of pictures, spread over a video, in which the tags are looked for"""
 SEVERAL = 0.1
@@ -164,26 +162,9 @@ def _check_view(path: Path, rig: Rig) -> None:
     pictures = [frame.image for frame in _spread(path)]
     if not pictures:
         raise ValueError(f"{path}: there is no picture in it")
-    height, width = pictures[0].shape[:2]
-    if (width, height) != tuple(rig.view.lens.size):
-        raise ValueError(
-            f"{path}: its pictures are {width} x {height}, those of the calibrated "
-            f"camera {rig.view.lens.size[0]} x {rig.view.lens.size[1]}"
-        )
-    known = rig.known_tags
-    if not known:
-        return
-    off = [moved(rig.view, find_tags(image), known) for image in pictures]
-    seen = [error for error in off if np.isfinite(error)]
-    if not seen:
-        raise ValueError(
-            f"{path}: none of the table's tags is seen; is this a video of the table?"
-        )
-    if float(np.median(seen)) > MOVED:
-        raise ValueError(
-            f"{path}: the tags are {np.median(seen):.1f} px from where they were; the "
-            "camera was moved after it was calibrated"
-        )
+    trouble = view_trouble(rig.view, pictures, rig.known_tags)
+    if trouble:
+        raise ValueError(f"{path}: {trouble}")
 
 
 def _spread(path: Path) -> list[Frame]:

@@ -11,12 +11,10 @@ import numpy as np
 
 from marl_airhockey.devices.camera import Camera, open_source
 from marl_airhockey.devices.hand_rig import HandRig
-from marl_airhockey.devices.vision.calibration import find_tags, moved
+from marl_airhockey.devices.vision.calibration import view_trouble
 from marl_airhockey.devices.vision.watcher import Watcher
 from marl_airhockey.types import Array
 
-MOVED = 2.0
-"""Error of the tags, px, at which the camera is not where it was calibrated"""
 LOST = 0.25
 """Time without a sighting after which the hand has left, s"""
 AHEAD = 0.12
@@ -82,11 +80,10 @@ class Hand:
             raise RuntimeError(
                 f"the hand's {self._camera.trouble}: is {self._rig.camera} right?"
             )
-        off = moved(self._rig.view, find_tags(frame.image), self._rig.known_tags)
-        if off > MOVED:
+        trouble = view_trouble(self._rig.view, [frame.image], self._rig.known_tags)
+        if trouble:
             raise RuntimeError(
-                f"the hand's camera: the tags are {off:.1f} px from where they were; "
-                "calibrate anew (airhockey calibrate --hand)"
+                f"the hand's camera: {trouble} (airhockey calibrate --hand)"
             )
 
     @property

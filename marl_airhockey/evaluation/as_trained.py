@@ -42,9 +42,7 @@ def as_trained(
             environments, or one names Python code that is not trusted.
     """
     known = {
-        name: player.trained_in
-        for name, player in players.items()
-        if player.trained_in
+        name: player.trained_in for name, player in players.items() if player.trained_in
     }
     if scenario is None:
         scenario = _agreed("scenario", known)

@@ -17,7 +17,11 @@ from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.build import (
+    Keywords,
+    build_driven_world,
+    table_keywords,
+)
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000
@@ -101,7 +105,7 @@ def evaluate(
         ValueError: A seat without a driver, one that does not fit, or a reward term
             that is nan, named.
     """
-    driver = make_agent(player)
+    driver, keywords = make_agent(player), table_keywords(keywords)
     name = name or name_of(player, driver)
     if not exact:
         scenario, keywords = as_trained({name: driver}, scenario, keywords)

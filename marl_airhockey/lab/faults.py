@@ -9,6 +9,8 @@ TABLE_FAULTS = {
     "frozen_camera": "no more frames come",
     "dark_camera": "the lights are off",
     "moved_camera": "somebody has knocked against the camera",
+    "delayed_frames": "frames come 0.2 s late",
+    "second_puck": "somebody has left a second puck on the table",
     "lost_puck": "the puck is not on the table",
 }
 FAULTS = {**ARM_FAULTS, **TABLE_FAULTS}

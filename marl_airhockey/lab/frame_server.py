@@ -21,7 +21,7 @@ class FrameServer:
     """
 
     def __init__(self, latency: float) -> None:
-        self._latency = latency
+        self.latency = latency
         self._waiting: SimpleQueue[Frame] = SimpleQueue()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._listener.getsockname()[1])
@@ -43,7 +43,7 @@ class FrameServer:
         while True:
             frame = self._waiting.get()
             packed = pack_frame(frame)
-            time.sleep(max(frame.taken + self._latency - time.monotonic(), 0.0))
+            time.sleep(max(frame.taken + self.latency - time.monotonic(), 0.0))
             with self._new:
                 self._packed, self._count = packed, self._count + 1
                 self._new.notify_all()

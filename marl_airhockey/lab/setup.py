@@ -35,6 +35,8 @@ class LabSetup:
     """Name of the table's preset"""
     tilt: float = TILT
     """deg"""
+    plant: str = "numba"
+    """Name of the backend that moves puck and paddle"""
     latency: float = 0.028
     """Time from the middle of an exposure until the picture can be had, s: half of the
     exposure, the readout and the transfer"""

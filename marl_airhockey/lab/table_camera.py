@@ -86,6 +86,8 @@ class TableCamera(LabCamera[Seen]):
         seed: int = 0,
     ) -> None:
         self._table, self._base = table, np.asarray(base)
+        self.left: Array | None = None
+        """Place (2,) of a second puck that lies on the table, m; None for none."""
         super().__init__(view, exposure, seed)
 
     def _draw_still(self, scene: Array, view: View) -> None:
@@ -103,10 +105,11 @@ class TableCamera(LabCamera[Seen]):
     ) -> None:
         view, radius = self.view, self._table.puck_radius
         paddle = seen.paddle + later * seen.paddle_velocity
-        if seen.puck is not None:
-            puck = seen.puck + later * seen.puck_velocity
-            shade(part, view, puck + SHADOW + radius * CIRCLE, corner)
-            fill(part, view, puck + radius * CIRCLE, PUCK_HEIGHT, PUCK, corner)
+        moved = None if seen.puck is None else seen.puck + later * seen.puck_velocity
+        for puck in (self.left, moved):
+            if puck is not None:
+                shade(part, view, puck + SHADOW + radius * CIRCLE, corner)
+                fill(part, view, puck + radius * CIRCLE, PUCK_HEIGHT, PUCK, corner)
         size = self._table.paddle_radius
         shade(part, view, paddle + 4 * SHADOW + size * CIRCLE, corner)
         fill(part, view, paddle + size * CIRCLE, PADDLE_TOP, PADDLE, corner)
@@ -121,8 +124,9 @@ class TableCamera(LabCamera[Seen]):
             self.view.project(np.column_stack([link, ARM_HEIGHTS])),
             self._disc(seen.paddle, table.paddle_radius),
         ]
-        if seen.puck is not None:
-            found.insert(0, self._disc(seen.puck, table.paddle_radius))
+        for puck in (self.left, seen.puck):
+            if puck is not None:
+                found.insert(0, self._disc(puck, table.paddle_radius))
         return found
 
     def _speed(self, seen: Seen) -> float:

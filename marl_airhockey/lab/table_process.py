@@ -22,6 +22,10 @@ LATE = 0.25
 """Time by which the loop may lag before it gives up what it missed, s"""
 MOVED = 0.02
 """Way of a camera that was knocked against, m"""
+DELAY = 0.2
+"""Time by which delayed frames come later, s"""
+LEFT = np.array([0.55, -0.25])
+"""Place of a second puck that was left on the table, m"""
 
 
 class TableLoop:
@@ -57,6 +61,8 @@ class TableLoop:
             "frozen_camera": self._freeze,
             "dark_camera": self._darken,
             "moved_camera": self._knock,
+            "delayed_frames": self._delay,
+            "second_puck": self._leave,
             "lost_puck": self._lose,
         }
 
@@ -65,6 +71,12 @@ class TableLoop:
 
     def _darken(self, on: bool) -> None:
         self._camera.dark = on
+
+    def _delay(self, on: bool) -> None:
+        self._server.latency = self._setup.latency + (DELAY if on else 0.0)
+
+    def _leave(self, on: bool) -> None:
+        self._camera.left = LEFT if on else None
 
     def _knock(self, on: bool) -> None:
         x, y, z = self._view.translation

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from marl_airhockey.backends.numba.backend import NumbaBackend
 from marl_airhockey.contracts.backend import Command
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.registry import find_backend
 from marl_airhockey.types import Array
 
 RATE = 120.0
@@ -32,8 +32,9 @@ class LabWorld:
 
     def __init__(self, setup: LabSetup, seed: int = 0) -> None:
         self.scene = Scene(setup.geometry, (setup.seat,), pucks=1)
-        self._backend = NumbaBackend(self.scene, 1, 1.0 / RATE)
-        physics = Physics(self.scene.defaults, "ur5e")
+        self._backend = find_backend(setup.plant)(self.scene, 1, 1.0 / RATE)
+        arms = not self._backend.tracks_commands
+        physics = Physics(self.scene.defaults, "ur5e", arms=arms)
         streams = StreamSet(1, "physics")
         rows = np.zeros(1, np.int64)
         streams.renew(rows, np.array([seed]), np.array([1]))

@@ -94,6 +94,7 @@ def build_world(
                 unknown_keyword(name, Keywords.__annotations__)
                 + "; fields of the scenario go into options={...}"
             )
+    keywords = table_keywords(keywords)
     threads()  # Refused here if it makes no sense, not at the first step.
     if num_worlds < 1:
         raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
@@ -148,6 +149,24 @@ def build_driven_world(
             f"{world.open[0]}, e.g. --driver paddle_{world.open[0]}=goalkeeper"
         )
     return world
+
+
+def table_keywords(keywords: Keywords) -> Keywords:
+    """Return keywords with what the rig of a real table says: its size and profile.
+
+    Those that are given stay, as do all of a simulation.
+
+    Raises:
+        ValueError: A rig that cannot be read.
+    """
+    backend = find_backend(keywords.get("backend", DEFAULT_BACKEND))
+    rig = keywords.get("rig", "")
+    known = backend.table_of(rig) if rig else None
+    if known is None:
+        return keywords
+    table, profile = known
+    options = {"table": table, **keywords.get("options", {})}
+    return {"profile": profile, **keywords, "options": options}
 
 
 def _backend(

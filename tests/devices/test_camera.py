@@ -16,6 +16,7 @@ from marl_airhockey.devices.camera import (
     StreamSource,
     SyntheticSource,
     open_source,
+    v4l2,
 )
 from marl_airhockey.devices.camera.sources import pack_frame
 
@@ -90,7 +91,13 @@ def test_a_video_is_played_to_its_end(tmp_path):
     assert means == sorted(means)
 
 
-@pytest.mark.parametrize("text", ["v4l2:x", "stream:", "webcam", "nothing.mp4"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("v4l2:x", "stream:", "webcam", "nothing.mp4", "stream:5,gain=1"),
+        *("v4l2:0,gian=20", "v4l2:0,gain=much", "v4l2:0,width=0", "v4l2:0,exposure"),
+    ],
+)
 def test_a_source_that_is_none_is_named(text):
     with pytest.raises(ValueError, match="camera"):
         open_source(text)
@@ -101,3 +108,62 @@ def test_a_camera_that_is_not_there_is_named():
         StreamSource(1).open()
     with pytest.raises(CameraError, match="no video"):
         FileSource("nothing.mp4").open()
+    with pytest.raises(CameraError, match=r"there is no /dev/video987; there are"):
+        open_source("v4l2:987,exposure=60").open()
+
+
+class Capture:
+    """Capture device of OpenCV that gives 640 x 480 pictures, whatever is asked for."""
+
+    def __init__(self, *_):
+        self.asked = {}
+
+    def isOpened(self):
+        return True
+
+    def set(self, name, value):
+        self.asked[name] = value
+
+    def get(self, name):
+        return {cv2.CAP_PROP_FRAME_WIDTH: 640, cv2.CAP_PROP_FRAME_HEIGHT: 480}[name]
+
+    def release(self):
+        pass
+
+
+@pytest.fixture
+def controls(monkeypatch, tmp_path):
+    """Values that controls were set to; the camera has no control of white balance."""
+    found = {}
+
+    def ioctl(descriptor, request, packed):
+        control, value = v4l2.CONTROL.unpack(packed)
+        if control == v4l2.CONTROLS["white_balance"][0]:
+            raise OSError(22, "Invalid argument")
+        found[control] = value
+
+    monkeypatch.setattr(v4l2.fcntl, "ioctl", ioctl)
+    monkeypatch.setattr(v4l2.cv2, "VideoCapture", Capture)
+    device = tmp_path / "video0"
+    device.touch()
+    monkeypatch.setattr(v4l2, "Path", lambda text: device)
+    return found
+
+
+def test_a_camera_keeps_to_what_it_was_set_to(controls):
+    open_source("v4l2:0,exposure=60,gain=20").open()
+    assert {control: controls[control] for control in v4l2.AUTOMATIC} == v4l2.AUTOMATIC
+    assert controls[v4l2.CONTROLS["exposure"][0]] == 60
+    assert controls[v4l2.CONTROLS["gain"][0]] == 20
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ("width=1280", "640 x 480, not of 1280 x 480"),
+        ("white_balance=4000", "refuses white_balance=4000"),
+    ],
+)
+def test_what_a_camera_cannot_do_is_named(controls, settings, reason):
+    with pytest.raises(CameraError, match=reason):
+        open_source(f"v4l2:0,{settings}").open()

@@ -33,3 +33,9 @@ def test_a_line_and_too_few_points_are_refused():
         fit_mounting(line, touched, np.zeros(3))
     with pytest.raises(ValueError, match="at least 3"):
         fit_mounting(line[:2], touched[:2], np.zeros(3))
+
+
+def test_a_mirrored_picture_is_refused():
+    touched = np.array([TRUE.pose(p)[:3] for p in PLACES])
+    with pytest.raises(ValueError, match="mirrored"):
+        fit_mounting(PLACES * (1.0, -1.0), touched, np.array(TRUE.tool))

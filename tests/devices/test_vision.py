@@ -12,6 +12,7 @@ from marl_airhockey.devices.vision.calibration import (
     tag_corners,
     view_from_clicks,
     view_from_tags,
+    view_trouble,
 )
 from marl_airhockey.lab.table_camera import (
     Seen,
@@ -139,3 +140,26 @@ def test_a_click_beside_the_puck_is_named(camera):
         Colour.around(image, (x, y))
     with pytest.raises(ValueError, match="outside"):
         Colour.around(image, (9000.0, 10.0))
+
+
+def test_a_picture_of_something_else_is_named(camera):
+    image = camera.photograph(Seen(None, STILL, HOME, STILL))
+    assert view_trouble(VIEW, [image], KNOWN) == ""
+    small = image[::2, ::2]
+    assert "320 x 240, those of the calibrated camera" in view_trouble(
+        VIEW, [small], KNOWN
+    )
+    assert "none of the table's tags" in view_trouble(VIEW, [image * 0 + 120], KNOWN)
+    assert "dark (mean 3 of 255)" in view_trouble(VIEW, [image * 0 + 3], KNOWN)
+    shifted = np.roll(image, 6, axis=1)
+    assert "px from where they were" in view_trouble(VIEW, [shifted], KNOWN)
+
+
+def test_a_second_puck_is_seen(camera, detector):
+    puck = np.array([0.2, 0.1])
+    camera.left = np.array([0.55, -0.25])
+    seen = Seen(puck, STILL, HOME, STILL)
+    found = detector.find_all(Frame(camera.photograph(seen), 0.0, 0))
+    camera.left = None
+    places = sorted(seen.place.tolist() for seen in found)
+    np.testing.assert_allclose(places, [[0.2, 0.1], [0.55, -0.25]], atol=0.003)

@@ -1,6 +1,7 @@
 """Figures in README and docs are those of the files in docs/data."""
 
 import csv
+import json
 from pathlib import Path
 from statistics import mean
 

@@ -9,6 +9,7 @@ import pytest
 
 import marl_airhockey as ah
 from marl_airhockey.core.errors import UnknownKeywordError
+from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import find_backend, make_agent
@@ -102,7 +103,7 @@ def test_what_is_not_on_the_table_is_refused_in_words(task, options, words):
 
 def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
     with pytest.raises(ValueError, match="table=full_size"):
-        ah.parallel_env("reach", backend="real", rig=str(rig))
+        ah.parallel_env("reach", **keywords(rig, table="standard"))
     with pytest.raises(ValueError, match="--lab"):
         ah.parallel_env("reach", backend="real")
     with pytest.raises(ValueError, match="no devices"):
@@ -113,8 +114,37 @@ def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
         ah.parallel_env("reach", rigg="x")
 
 
-def test_a_camera_that_was_moved_is_noticed(lab, rig, fault):
-    fault("moved_camera")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("moved_camera", "calibrate anew"),
+        ("dark_camera", "are the lights on"),
+        ("second_puck", "2 things have the puck's colour"),
+    ],
+)
+def test_what_is_wrong_with_the_picture_is_noticed_first(rig, fault, name, words):
+    fault(name)
     time.sleep(1.0)
-    with pytest.raises(RuntimeError, match="calibrate anew"):
-        ah.parallel_env("reach", **keywords(rig))
+    with pytest.raises(RuntimeError, match=words):
+        ah.parallel_env("juggle", **keywords(rig))
+
+
+def test_delayed_frames_are_older_and_played_with(rig, fault):
+    fault("delayed_frames")
+    env = ah.parallel_env("juggle", **keywords(rig))
+    try:
+        env.reset(seed=0)
+        for _ in range(5):
+            env.step({"paddle_0": np.zeros(2)})
+        assert 190.0 < env.unwrapped.world.backend.telemetry()["frame_ms"] < 300.0
+    finally:
+        env.close()
+
+
+def test_what_the_rig_says_need_not_be_said(rig):
+    env = ah.parallel_env("reach", backend="real", rig=str(rig))
+    try:
+        assert env.unwrapped.world.scene.table == TABLES["full_size"]
+        assert "own.requested[-1].x" in env.unwrapped.world.observer.labels
+    finally:
+        env.close()

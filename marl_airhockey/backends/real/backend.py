@@ -24,16 +24,16 @@ from marl_airhockey.devices.rig import Rig
 from marl_airhockey.devices.robot import DriverState, Fault, Robot, RobotError
 from marl_airhockey.devices.robot.limits import check_reach, read_limits
 from marl_airhockey.devices.vision import Detector, Sighting
-from marl_airhockey.devices.vision.calibration import find_tags, moved
+from marl_airhockey.devices.vision.calibration import view_trouble
 from marl_airhockey.devices.vision.rectifier import Rectifier
 from marl_airhockey.devices.vision.watcher import Watcher
 from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
+PROFILE = "ur5e"
+"""Profile of its robot"""
 FIRST_FRAME = 10.0
 """Longest time from opening a camera to its first frame, s"""
-MOVED = 2.0
-"""Error of the tags, px, at which the camera is not where it was calibrated"""
 BLIND = 0.3
 """Time without a picture after which an episode ends, s"""
 LOST = 2.0
@@ -78,6 +78,7 @@ class RealBackend(Backend):
         self._reason = ""
         self._due = 0.0
         self._began = self._moment = 0.0
+        self._overruns = 0
         self._asked = np.zeros(2)
         self._allowed = False
 
@@ -102,6 +103,10 @@ class RealBackend(Backend):
         if scene.table not in TABLES.values():
             return "the table is none of the presets"
         return None
+
+    @classmethod
+    def table_of(cls, rig: str) -> tuple[str, str] | None:
+        return Rig.load(Path(rig)).table, PROFILE
 
     def connect(self, rig: str) -> None:
         if not rig:
@@ -129,6 +134,7 @@ class RealBackend(Backend):
                 *(self.rig.view, self.rig.puck, table.puck_radius, half),  # type: ignore[arg-type]
                 readout=self.rig.readout,
             )
+            self._check_pucks(detector)
             self._overlay = Overlay(self.rig.view, table)
             self.rectifier = Rectifier(self.rig.view, table.size)
             self._check_arm()
@@ -143,11 +149,19 @@ class RealBackend(Backend):
         frame = self._camera.next(seconds=FIRST_FRAME)
         if frame is None:
             raise RuntimeError(f"{self._camera.trouble}: is {self.rig.camera} right?")
-        off = moved(self.rig.view, find_tags(frame.image), self.rig.known_tags)
-        if off > MOVED:
+        trouble = view_trouble(self.rig.view, [frame.image], self.rig.known_tags)
+        if trouble:
+            raise RuntimeError(f"camera {self.rig.camera}: {trouble}")
+
+    def _check_pucks(self, detector: Detector) -> None:
+        """Refuse a table on which several things have the puck's colour."""
+        frame = self._camera.newest
+        assert frame is not None
+        found = [np.round(seen.place, 2).tolist() for seen in detector.find_all(frame)]
+        if self.scene.pucks and len(found) > 1:
             raise RuntimeError(
-                f"camera: the tags are {off:.1f} px from where they were; it was moved "
-                "or the table was: calibrate anew"
+                f"camera: {len(found)} things have the puck's colour and size, at "
+                f"{found} m; leave one puck on the table, or calibrate another colour"
             )
 
     def _check_arm(self) -> None:
@@ -275,9 +289,11 @@ class RealBackend(Backend):
         left = self._due - time.monotonic()
         if left > 0:
             time.sleep(left)
-        elif left < -2 * self.control_dt:
-            # What was missed is not made up for by a hurry.
-            self._due = time.monotonic()
+        else:
+            self._overruns += 1
+            if left < -2 * self.control_dt:
+                # What was missed is not made up for by a hurry.
+                self._due = time.monotonic()
         now = time.monotonic()
         for name in ("touched", "banked", "crossed", "crossed_velocity", "lifted"):
             getattr(after, name)[:] = 0
@@ -334,6 +350,7 @@ class RealBackend(Backend):
             "cycles": int(status.cycles),
             "late": int(status.late),
             "refused": int(status.refused),
+            "overruns": self._overruns,
             "camera": camera.trouble,
             "frame_ms": round(1e3 * min(camera.age, 99.0), 1),
             "dropped": camera.dropped,

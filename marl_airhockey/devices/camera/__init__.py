@@ -7,18 +7,18 @@ what was.
 from marl_airhockey.devices.camera.camera import Camera, CameraError, Frame, Source
 from marl_airhockey.devices.camera.film import Film
 from marl_airhockey.devices.camera.sources import (
-    LATENCY,
-    CapturedSource,
     FileSource,
     StreamSource,
     SyntheticSource,
     open_source,
 )
+from marl_airhockey.devices.camera.v4l2 import LATENCY, CapturedSource, CaptureSettings
 
 __all__ = [
     "LATENCY",
     "Camera",
     "CameraError",
+    "CaptureSettings",
     "CapturedSource",
     "FileSource",
     "Film",

@@ -1,4 +1,4 @@
-"""Sources of frames: a camera on this machine, a file, a stream, a function."""
+"""Sources of frames: a file, a stream, a function, or what a text names."""
 
 from __future__ import annotations
 
@@ -15,64 +15,18 @@ import cv2
 import numpy as np
 
 from marl_airhockey.devices.camera.camera import CameraError, Frame, Source
+from marl_airhockey.devices.camera.v4l2 import (
+    LATENCY,
+    CapturedSource,
+    CaptureSettings,
+)
 from marl_airhockey.types import Array
 
 HEADER = struct.Struct(">4sQdII")
 """Head of a frame in a stream: `MAGIC`, number, time taken, height, width"""
 MAGIC = b"AIRF"
-LATENCY = 0.025
-"""Time from the middle of an exposure until its picture is here, s, unless it was
-measured: half an exposure of 8 ms, the readout and the transfer of a PS Eye"""
 CONNECT = 3.0
 """Longest time until a stream answers, s"""
-
-
-class CapturedSource:
-    """Source that is a camera of this machine, by V4L2.
-
-    Args:
-        device: its number.
-        width: of the pictures.
-        height: of the pictures.
-        rate: frames a second.
-        latency: s from the middle of an exposure until the picture is here.
-    """
-
-    def __init__(
-        self,
-        device: int,
-        width: int = 640,
-        height: int = 480,
-        rate: float = 60.0,
-        latency: float = LATENCY,
-    ) -> None:
-        self._device, self._size, self._rate = device, (width, height), rate
-        self._latency, self._count = latency, 0
-        self._capture: Any = None
-
-    def open(self) -> None:
-        capture = cv2.VideoCapture(self._device, cv2.CAP_V4L2)
-        if not capture.isOpened():
-            raise CameraError(
-                f"device {self._device} cannot be opened; see which there are with "
-                "ls /dev/video*"
-            )
-        capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size[0])
-        capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size[1])
-        capture.set(cv2.CAP_PROP_FPS, self._rate)
-        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
-        self._capture = capture
-
-    def read(self) -> Frame | None:
-        found, image = self._capture.read()
-        if not found:
-            raise CameraError(f"device {self._device} gives no more pictures")
-        self._count += 1
-        return Frame(image, time.monotonic() - self._latency, self._count - 1)
-
-    def close(self) -> None:
-        if self._capture is not None:
-            self._capture.release()
 
 
 class FileSource:
@@ -207,20 +161,22 @@ def open_source(text: str, latency: float = LATENCY) -> Source:
     """Return the source that a text names.
 
     Args:
-        text: ``v4l2:0``, ``stream:PORT``, or the path of a video.
+        text: ``v4l2:0`` with settings (``v4l2:0,exposure=60,gain=20``, see
+            `CaptureSettings`), ``stream:PORT``, or the path of a video.
         latency: of a camera of this machine, see `CapturedSource`.
 
     Raises:
-        ValueError: neither.
+        ValueError: neither, or an unknown setting.
     """
     kind, _, rest = text.partition(":")
     if kind in ("v4l2", "stream"):
-        if not rest.isdigit():
+        number, *words = rest.split(",")
+        if not number.isdigit() or (words and kind == "stream"):
             raise ValueError(f"camera {text!r}: expected {kind}: and a number")
-        number = int(rest)
-        if kind == "v4l2":
-            return CapturedSource(number, latency=latency)
-        return StreamSource(number)
+        if kind == "stream":
+            return StreamSource(int(number))
+        pairs = {name: value for name, _, value in (w.partition("=") for w in words)}
+        return CapturedSource(int(number), CaptureSettings.of(pairs), latency)
     if Path(text).exists():
         return FileSource(text)
     raise ValueError(

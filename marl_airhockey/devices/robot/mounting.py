@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from marl_airhockey.devices.robot.kinematics import matrix_of
 from marl_airhockey.types import Array
 
 
@@ -80,7 +81,8 @@ def fit_mounting(points: Array, touched: Array, tool: Array) -> Mounting:
         tool: (3,) rotation vector of the tool.
 
     Raises:
-        ValueError: too few points, or all in a line.
+        ValueError: too few points, all in a line, or a table whose plane the tool would
+            touch from below: what the camera sees is mirrored.
     """
     points, touched = np.asarray(points, float), np.asarray(touched, float)
     if len(points) < 3 or len(points) != len(touched):
@@ -92,6 +94,13 @@ def fit_mounting(points: Array, touched: Array, tool: Array) -> Mounting:
         raise ValueError("all points lie in a line: touch some beside it")
     sign = np.diag([1.0, 1.0, np.linalg.det(u @ vt)])
     rotation = u @ sign @ vt
+    into = matrix_of(np.asarray(tool, float))[:, 2]
+    if rotation[:, 2] @ into > 0.0:
+        raise ValueError(
+            "the points are mirrored: the tool would touch the table from below; is "
+            "the camera's picture flipped, were the corners clicked in the other "
+            "direction, or is y counted the other way?"
+        )
     origin = base - rotation @ middle
     off = touched - (origin + flat @ rotation.T)
     residual = float(np.sqrt((off**2).sum(1).mean()))

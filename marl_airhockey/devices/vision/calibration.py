@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
@@ -18,6 +18,10 @@ LEAST_TAGS = 4
 """Number of tags that must be seen"""
 WORST = 2.0
 """Largest error of a corner, px, beyond which a calibration is refused"""
+MOVED = 2.0
+"""Error of the tags, px, at which a camera is not where it was calibrated"""
+DARK = 40.0
+"""Mean of a picture, of 255, below which it is dark"""
 
 
 def tag_corners(place: Array) -> Array:
@@ -105,6 +109,43 @@ def _view(pixels: Array, places: Array, lens: Lens) -> View:
             "tag not where it should be, or a point clicked in another order?"
         )
     return View(lens, vector, shift, residual)  # type: ignore[arg-type]
+
+
+def view_trouble(
+    view: View, pictures: Sequence[Array], known: Mapping[int, Array]
+) -> str:
+    """Return why pictures do not show a table as it was calibrated; "" if they do.
+
+    Args:
+        view: of the calibration.
+        pictures: (H, W, 3) uint8 each, at least one.
+        known: corners (4, 2) of the tags by number, table frame, m; without any,
+            nothing tells whether the camera was moved.
+    """
+    height, width = pictures[0].shape[:2]
+    if (width, height) != tuple(view.lens.size):
+        return (
+            f"its pictures are {width} x {height}, those of the calibrated camera "
+            f"{view.lens.size[0]} x {view.lens.size[1]}; set that size, or calibrate "
+            "anew"
+        )
+    if not known:
+        return ""
+    off = [moved(view, find_tags(picture), known) for picture in pictures]
+    seen = [error for error in off if np.isfinite(error)]
+    if not seen:
+        light = float(np.mean([picture.mean() for picture in pictures]))
+        dark = f", and the picture is dark (mean {light:.0f} of 255)"
+        return (
+            f"none of the table's tags is seen{dark if light < DARK else ''}; is this "
+            "the camera over the table, are the lights on, is the lens free?"
+        )
+    if np.median(seen) > MOVED:
+        return (
+            f"the tags are {np.median(seen):.1f} px from where they were; the camera "
+            "was moved or the table was: calibrate anew"
+        )
+    return ""
 
 
 def moved(view: View, seen: Mapping[int, Array], known: Mapping[int, Array]) -> float:
