@@ -63,21 +63,16 @@ def open_emulator(
     with waiting("preparing the arm"):
         controller = Controller(LabSetup().make_arm(), version)
 
-    async def serve() -> None:
-        """Serve, and print the address once it answers."""
-        task = asyncio.create_task(serve_emulator(controller, address, schedule))
-        while not controller.ticks and not task.done():
-            await asyncio.sleep(0.01)
-        if not task.done():
-            console.print(
-                f"UR5e at {address}: RTDE 30004, script 30003, dashboard 29999\n"
-                f"faults: airhockey ur-emulator fault NAME --address {address}\n"
-                "Ctrl+C ends it"
-            )
-        await task
+    def announce() -> None:
+        """Print the address."""
+        console.print(
+            f"UR5e at {address}: RTDE 30004, script 30003, dashboard 29999\n"
+            f"faults: airhockey ur-emulator fault NAME --address {address}\n"
+            "Ctrl+C ends it"
+        )
 
     with contextlib.suppress(KeyboardInterrupt):
-        asyncio.run(serve())
+        asyncio.run(serve_emulator(controller, address, schedule, announce))
 
 
 @ur_emulator.command("fault")

@@ -131,6 +131,7 @@ def test_what_is_wrong_with_the_picture_is_noticed_first(rig, fault, name, words
 
 def test_delayed_frames_are_older_and_played_with(rig, fault):
     fault("delayed_frames")
+    time.sleep(0.5)
     env = ah.parallel_env("juggle", **keywords(rig))
     try:
         env.reset(seed=0)

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from emulators import ADDRESS, emulator, switch, until
+from emulators import ADDRESS, emulator, status, switch, until
 from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
@@ -259,6 +259,7 @@ def test_a_taken_address_is_named():
     with emulator():
         result = CliRunner().invoke(app, ["ur-emulator", "--address", ADDRESS])
         assert "is taken" in str(result.exception)
+        assert status(), "the one that runs is still found"
 
 
 def test_times_of_a_fault_are_in_seconds():

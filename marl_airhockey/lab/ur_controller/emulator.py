@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -83,6 +83,7 @@ async def serve_emulator(
     controller: Controller,
     address: str,
     schedule: Sequence[ScheduledFault] = (),
+    ready: Callable[[], None] = lambda: None,
 ) -> None:
     """Serve a controller at an address until cancelled.
 
@@ -90,6 +91,7 @@ async def serve_emulator(
         controller: Controller with its arm.
         address: Loopback address.
         schedule: Faults at set times.
+        ready: Function that is called once clients can connect.
 
     Raises:
         RuntimeError: A port of the address is taken.
@@ -119,10 +121,17 @@ async def serve_emulator(
             await asyncio.sleep(fault.end - fault.begin)
             await switch(fault.name, False)
 
+    serving = asyncio.create_task(Ports(controller).serve([address]))
     waiting = [asyncio.create_task(follow(fault)) for fault in schedule]
     try:
+        while not (controller.ticks or serving.done()):
+            await asyncio.sleep(0.01)
+        if serving.done():
+            # The door's file may be that of the emulator which has the ports.
+            return await serving
         with open_door(answer, door_file(address)):
-            await Ports(controller).serve([address])
+            ready()
+            await serving
     finally:
-        for task in waiting:
+        for task in (serving, *waiting):
             task.cancel()

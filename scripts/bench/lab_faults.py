@@ -1,0 +1,156 @@
+"""Measure what an episode does when devices fail: each fault of the lab, and pairs.
+
+    python scripts/bench/lab_faults.py --out docs/data/lab_faults.json
+
+The learned juggler plays through camera and arm; after a second one or two faults are
+switched on. Printed are the reason with which the episode ends, the time until then and
+until the true paddle rests for good (below 0.01 m/s), and how far it moved on after the
+episode's end. "plays on" is for what ends no episode within the time that is listened.
+It takes about 25 minutes, in real time: nothing else should run meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import time
+from collections import Counter
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
+from marl_airhockey.lab.faults import ARM_FAULTS, TABLE_FAULTS
+from marl_airhockey.lab.lab import Lab, LabClient, served
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.world import World
+
+BEFORE, LISTEN = 20, 80
+"""Control steps before a fault, and the most after it"""
+REST = 2.0
+"""Longest time for which an ended episode's paddle is listened to, s"""
+STILL = 0.01
+"""Speed below which the paddle rests, m/s"""
+QUIET = "local_control"
+"""Fault that stops no program that runs"""
+
+
+class Outcome(NamedTuple):
+    """Outcome of an episode with faults."""
+
+    reason: str
+    """Reason of its end; "" if it plays on"""
+    ended_s: float
+    """Time from the fault to that end; nan if it plays on"""
+    rest_s: float
+    """Time from the fault until the paddle rests for good; nan if it does not"""
+    moved_m: float
+    """Distance by which the paddle moved after the end"""
+
+
+def paddle_of(lab: Lab) -> Array:
+    """Return (5,) time, s, position, m, and velocity, m/s, of the true paddle."""
+    truth = lab.ask({"do": "truth"})
+    return np.array([truth["time"], *np.array(truth["paddle"])[[0, 1, 3, 4]]])
+
+
+def play(lab: Lab, world: World, faults: tuple[str, ...], seed: int) -> Outcome | None:
+    """Return the outcome of an episode; None if it ended before the faults could."""
+    no_actions, rows = np.zeros((1, 0, 2)), []
+    world.reset(seed)
+    for _ in range(BEFORE):
+        result = world.step(no_actions)
+        if result.terminated[0] or result.truncated[0]:
+            return None
+    begin = time.monotonic()
+    for name in faults:
+        lab.ask({"do": "fault", "name": name, "on": True})
+    reason, ended = "", np.nan
+    for _ in range(LISTEN):
+        result = world.step(no_actions)
+        rows.append(paddle_of(lab))
+        if result.interruption:
+            reason, ended = result.interruption, time.monotonic() - begin
+            break
+        if result.terminated[0] or result.truncated[0]:
+            return None
+    until, end = time.monotonic() + REST, paddle_of(lab)
+    while reason and time.monotonic() < until:
+        rows.append(paddle_of(lab))
+        time.sleep(0.005)
+    track = np.array(rows)
+    moving = track[np.hypot(track[:, 3], track[:, 4]) > STILL, 0]
+    rests = reason and moving.size and moving[-1] < track[-1, 0]
+    rest = max(moving[-1] - begin, 0.0) if rests else np.nan
+    moved = float(np.linalg.norm(track[-1, 1:3] - end[1:3])) if reason else np.nan
+    return Outcome(reason, ended, rest, moved)
+
+
+def measure(
+    lab: Lab, world: World, faults: tuple[str, ...], seeds: itertools.count[int]
+) -> dict[str, object]:
+    """Return the row of some faults."""
+    outcome = None
+    while outcome is None:
+        try:
+            outcome = play(lab, world, faults, next(seeds))
+        finally:
+            for name in faults:
+                lab.ask({"do": "fault", "name": name, "on": False})
+    row: dict[str, object] = {"faults": " + ".join(faults), "reason": outcome.reason}
+    numbers = outcome._asdict()
+    del numbers["reason"]
+    for name, value in numbers.items():
+        row[name] = None if np.isnan(value) else round(float(value), 3)
+    return row
+
+
+def show(row: dict[str, object]) -> None:
+    """Print a row of the table."""
+    cells = [str(row["faults"]), str(row["reason"] or "plays on")]
+    for name, scale in (("ended_s", 1e3), ("rest_s", 1e3), ("moved_m", 1e3)):
+        value = row[name]
+        cells.append("" if value is None else f"{scale * float(str(value)):.0f}")
+    print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--alone", action="store_true", help="leave out pairs")
+    parser.add_argument("--out", type=Path, help="file for the rows, JSON")
+    given = parser.parse_args()
+    names = [name for name in (*ARM_FAULTS, *TABLE_FAULTS) if name != QUIET]
+    groups: list[tuple[str, ...]] = [(name,) for name in names]
+    if not given.alone:
+        groups += itertools.combinations(names, 2)
+    rows, seeds = [], itertools.count(1)
+    print("| faults | reason | episode ends, ms | at rest, ms | moved on, mm |")
+    print("| --- | --- | --- | --- | --- |")
+    with Lab() as lab, served(lab, announce=False) as port:
+        path = cache_folder() / f"faults-{port}.json"
+        with closing(LabClient(port)) as client:
+            calibrate_lab(client).save(path)
+        policy = load_policy("zoo/juggle_full_size")
+        keywords: Keywords = {"backend": "real", "rig": str(path)}
+        world = build_driven_world(policy, "juggle", 1, keywords)
+        try:
+            for group in groups:
+                rows.append(measure(lab, world, group, seeds))
+                show(rows[-1])
+        finally:
+            world.close()
+            path.unlink()
+    print(Counter(str(row["reason"]) for row in rows))
+    if given.out:
+        given.out.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
