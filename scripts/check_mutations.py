@@ -153,8 +153,8 @@ FAULTS = [
     Fault(
         "camera upside down",
         "marl_airhockey/devices/vision/lens.py",
-        "self.centre[:2] + steps[:, None] * ways[:, :2]",
-        "self.centre[:2] - steps[:, None] * ways[:, :2]",
+        "self.centre[:2] + steps[:, None] * directions[:, :2]",
+        "self.centre[:2] - steps[:, None] * directions[:, :2]",
         "devices/test_vision.py",
     ),
     Fault(

@@ -1,1 +1,1 @@
-"""Devices: cameras, what sees in their pictures, and robots."""
+"""Devices: cameras, vision and robots."""

@@ -1,7 +1,7 @@
 """Block: numbers that one process writes and others read, without a lock.
 
-A counter is odd while a block is written, so that a reader never takes half of an old
-one; a process that is killed while it writes leaves nothing held.
+A counter is odd while a block is written, so that a reader does not mix old and new
+numbers. A process that is killed while it writes leaves no lock behind.
 """
 
 from __future__ import annotations
@@ -11,24 +11,28 @@ import time
 from marl_airhockey.types import Array
 
 PATIENCE = 0.05
-"""Time after which a block that is being written has been left so, s"""
+"""Time after which a reader no longer waits for an unfinished write, s"""
 
 
 class Block:
-    """Numbers in shared memory, the first of which counts writes."""
+    """Numbers in shared memory; the first one counts writes.
+
+    Args:
+        numbers: (1 + n,) counter and n values.
+    """
 
     def __init__(self, numbers: Array) -> None:
         self._counter, self._numbers = numbers[:1], numbers[1:]
 
     def write(self, values: tuple[float, ...] | Array) -> None:
         """Write all numbers."""
-        # Odd whatever a writer that was killed has left.
+        # Odd in any case, even after a writer that was killed.
         self._counter[0] += 1 + self._counter[0] % 2
         self._numbers[:] = values
         self._counter[0] += 1
 
     def read(self) -> Array:
-        """Return all numbers as they were written together; a copy."""
+        """Return a copy of all numbers of one write."""
         until = time.monotonic() + PATIENCE
         while True:
             before = self._counter[0]

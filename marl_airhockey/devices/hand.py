@@ -1,4 +1,4 @@
-"""Hand: where a person moves a paddle under a camera, and how fast."""
+"""Hand: position and velocity of a paddle that a person moves under a camera."""
 
 from __future__ import annotations
 
@@ -16,37 +16,36 @@ from marl_airhockey.devices.vision.watcher import Watcher
 from marl_airhockey.types import Array
 
 LOST = 0.25
-"""Time without a sighting after which the hand has left, s"""
+"""Time without a sighting after which the hand counts as gone, s"""
 AHEAD = 0.12
-"""Longest time by which its motion is carried on from the last sighting, s"""
+"""Longest time of an extrapolation from the last sighting, s"""
 JERK = 60.0
-"""Standard deviation of a hand's jerk, m/s3: about that of strokes of 0.2 m, two a
-second"""
+"""Standard deviation of a hand's jerk, m/s3: about that of strokes of 0.2 m at 2 Hz"""
 START = (0.001, 1.0, 10.0)
-"""Standard deviations of place, velocity and acceleration of a hand that comes into the
-picture, m and s"""
+"""Standard deviations of position, m, velocity, m/s, and acceleration, m/s2, of a hand
+that enters the image"""
 NOISE = 0.001
-"""Standard deviation of a sighting, m"""
+"""Standard deviation of the position of a sighting, m"""
 
 
 class HandMotion(NamedTuple):
-    """Motion of a hand now, field's frame."""
+    """Motion of a hand now, field frame."""
 
     place: Array
-    """(2,) m"""
+    """(2,) position, m"""
     velocity: Array
-    """(2,) m/s"""
+    """(2,) velocity, m/s"""
     age: float
-    """Time since the sighting that it comes from, s"""
+    """Time since the last sighting, s"""
 
 
 class Hand:
     """Hand under the camera of a rig. It is used in a ``with`` block.
 
-    A Kalman filter with a random jerk makes the motion of what the camera sees.
+    A Kalman filter with a random jerk estimates the motion from the sightings.
 
     Args:
-        rig: of the hand.
+        rig: Rig of the hand.
     """
 
     def __init__(self, rig: HandRig) -> None:
@@ -59,8 +58,8 @@ class Hand:
         """Open the camera.
 
         Raises:
-            CameraError: there is none.
-            RuntimeError: it shows nothing, or was moved since it was calibrated.
+            CameraError: There is no such camera.
+            RuntimeError: No frame arrives, or it does not fit the calibration.
         """
         try:
             self._camera = self._devices.enter_context(
@@ -78,7 +77,8 @@ class Hand:
         frame = self._camera.next(seconds=3.0)
         if frame is None:
             raise RuntimeError(
-                f"the hand's {self._camera.trouble}: is {self._rig.camera} right?"
+                f"the hand's {self._camera.trouble}; check that {self._rig.camera} is "
+                "the camera"
             )
         trouble = view_trouble(self._rig.view, [frame.image], self._rig.known_tags)
         if trouble:
@@ -88,7 +88,7 @@ class Hand:
 
     @property
     def trouble(self) -> str:
-        """Reason why there is no motion; "" while there is."""
+        """Reason why there is no motion; "" without a problem."""
         if self._camera.trouble:
             return f"the hand's {self._camera.trouble}"
         if self._taken is None or time.monotonic() - self._taken > LOST:
@@ -96,7 +96,7 @@ class Hand:
         return ""
 
     def read(self) -> HandMotion | None:
-        """Return how the hand moves now; None while it is not seen."""
+        """Return the hand's motion now; None while it is not seen."""
         for sighting in self._watcher.take():
             self._update(sighting.place, sighting.taken)
         if self._taken is None:
@@ -104,16 +104,20 @@ class Hand:
         age = time.monotonic() - self._taken
         if age > LOST:
             return None
-        place, velocity, _ = _flow(min(age, AHEAD)) @ self._mean
-        return HandMotion(place, velocity, age)
+        position, velocity, _ = _flow(min(age, AHEAD)) @ self._mean
+        return HandMotion(position, velocity, age)
 
-    def _update(self, place: Array, taken: float) -> None:
-        """Take a sighting into the mean: rows place, velocity and acceleration.
+    def _update(self, position: Array, taken: float) -> None:
+        """Update the mean: rows of position, velocity and acceleration.
 
-        Both axes share the covariance, as they share all noise.
+        Both axes share one covariance, as their noise is the same.
+
+        Args:
+            position: (2,) position of a sighting, field frame, m.
+            taken: Time of the sighting, s.
         """
         if self._taken is None or taken - self._taken > LOST:
-            self._mean = np.stack([place, np.zeros(2), np.zeros(2)])
+            self._mean = np.stack([position, np.zeros(2), np.zeros(2)])
             self._covariance = np.diag(np.square(START))
             self._taken = taken
             return
@@ -124,7 +128,7 @@ class Hand:
         covariance = flow @ self._covariance @ flow.T + np.outer(push, push)
         gain = covariance[:, 0] / (covariance[0, 0] + NOISE**2)
         mean = flow @ self._mean
-        self._mean = mean + gain[:, None] * (place - mean[0])
+        self._mean = mean + gain[:, None] * (position - mean[0])
         self._covariance = covariance - np.outer(gain, covariance[0])
         self._taken = taken
 
@@ -138,5 +142,5 @@ class Hand:
 
 
 def _flow(dt: float) -> Array:
-    """Return (3, 3) by which place, velocity and acceleration go on for a time, s."""
+    """Return the transition (3, 3) of position, velocity, acceleration over dt, s."""
     return np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""Rig of a hand: a camera over a field on which a person moves a paddle."""
+"""Rig of a hand: a camera above a field on which a person moves a paddle."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ KIND = "hand"
 
 @dataclass(frozen=True)
 class HandRig:
-    """Rig of a hand. The field's frame: origin at its middle, x away from the person.
+    """Rig of a hand. Field frame: origin at the field's centre, x away from the person.
 
     Raises:
-        ValueError: a field without a size.
+        ValueError: The size of the field is not two positive lengths.
     """
 
     camera: str
-    """Source of the pictures, see `camera.open_source`"""
+    """Source of the frames, see `camera.open_source`"""
     view: View
     """View of the field"""
     paddle: Colour
@@ -36,11 +36,11 @@ class HandRig:
     radius: float = 0.047625
     """Radius of the paddle, m"""
     height: float = 0.06
-    """Height of its top above the field, m"""
+    """Height of the paddle's top above the field, m"""
     readout: float = 0.0
-    """Time between the first and the last row of a picture, s"""
+    """Time between the exposures of the first and the last row of a frame, s"""
     tags: dict[str, list[list[float]]] = field(default_factory=dict)
-    """Corners of the printed tags by number, field's frame, m"""
+    """Corners of the printed tags by number, field frame, m"""
     made: str = ""
     """Date of the calibration"""
 
@@ -50,7 +50,7 @@ class HandRig:
 
     @property
     def known_tags(self) -> dict[int, Array]:
-        """Corners (4, 2) of the tags by number, field's frame, m."""
+        """Corners (4, 2) of the tags by number, field frame, m."""
         return {int(k): np.array(four) for k, four in self.tags.items()}
 
     @property
@@ -61,16 +61,16 @@ class HandRig:
         return Detector(*parts, readout=self.readout)
 
     def save(self, path: Path) -> None:
-        """Write it as JSON."""
+        """Write the rig as JSON."""
         save_rig(path, KIND, asdict(self))
 
     @staticmethod
     def load(path: Path) -> HandRig:
-        """Read it.
+        """Read a rig.
 
         Raises:
-            ValueError: a file that is missing, of another format or kind, or holds
-                something that makes no sense, named.
+            ValueError: The file is missing, or its format, its kind or a field is
+                wrong.
         """
         given = load_rig(path, KIND)
         try:

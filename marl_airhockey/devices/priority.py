@@ -1,4 +1,4 @@
-"""Priority: processes that must be in time are served before others."""
+"""Priority: raised scheduling priority for processes with deadlines."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import contextlib
 import os
 
 FIRST = -20
-"""Niceness of such a process"""
+"""Niceness of a process with deadlines"""
 
 
 def raise_priority() -> None:
-    """Ask the operating system to serve this process first.
+    """Ask the operating system to schedule this process first.
 
-    It refuses where users have no right to that; the process is then as all others,
-    and a busy machine may make it late.
+    Without the permission for it, the process keeps its priority, and a busy machine
+    may delay it.
     """
     with contextlib.suppress(OSError):
         os.nice(FIRST - os.nice(0))

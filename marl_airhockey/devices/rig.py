@@ -1,4 +1,4 @@
-"""Rig: the devices at one real table and how they are calibrated, in one JSON file."""
+"""Rig: the devices at one real table and their calibration, in one JSON file."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from marl_airhockey.devices.vision.lens import View
 from marl_airhockey.types import Array
 
 LATEST = 0.2
-"""Time until a stop begins, at most, in the stopping distance that is told, s"""
+"""Longest time until a stop begins, s, in the stopping distance that a rig reports"""
 
 
 @dataclass(frozen=True)
 class Rig:
-    """Rig: what backend ``real`` needs to know of a table.
+    """Rig: what the backend ``real`` needs to know about a table.
 
     Raises:
-        ValueError: limits above what the pendant's leave room for.
+        ValueError: The limits are too close to those at the pendant.
     """
 
     table: str
     """Name of the table's preset"""
     camera: str
-    """Source of the pictures, see `camera.open_source`"""
+    """Source of the frames, see `camera.open_source`"""
     view: View
     puck: Colour
     """Colour of the puck"""
@@ -41,14 +41,14 @@ class Rig:
     """Address of the arm's controller"""
     mounting: Mounting
     tool: tuple[float, ...] = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-    """Pose of the paddle's foot in the flange's frame, m and rad"""
+    """Pose of the paddle's foot, flange frame, m and rad"""
     payload: float = 0.6
-    """Mass of the paddle and what holds it, kg"""
+    """Mass of the paddle and its holder, kg"""
     latency: float = LATENCY
-    """Time from the middle of an exposure until its picture is here, s, which
-    ``airhockey calibrate delay`` measures"""
+    """Time from the middle of an exposure until its frame has arrived, s; ``airhockey
+    calibrate delay`` measures it"""
     readout: float = 0.0
-    """Time between the first and the last row of a picture, s"""
+    """Time between the exposures of the first and the last row of a frame, s"""
     tags: dict[str, list[list[float]]] = field(default_factory=dict)
     """Corners of the printed tags by number, table frame, m"""
     limits: MotionLimits = field(default_factory=MotionLimits)
@@ -56,9 +56,9 @@ class Rig:
     smoothing: Smoothing = field(default_factory=Smoothing)
     """Filter of the commands"""
     operator: str = "person"
-    """Who puts the puck on the table: "person" or "lab:PORT" """
+    """Operator that puts the puck on the table: "person" or "lab:PORT" """
     paddle: Colour | None = None
-    """Colour of the paddle's top, by which it is found in videos; None if unknown"""
+    """Colour of the paddle's top, for its detection in videos; None if unknown"""
     made: str = ""
     """Date of the calibration"""
 
@@ -66,7 +66,7 @@ class Rig:
         check_pendant(self.limits, self.pendant)
 
     def driver_config(self, reach: tuple[tuple[float, float], ...]) -> DriverConfig:
-        """Return what the driver of its arm has to know, for a seat's reach."""
+        """Return the configuration of the arm's driver for a seat's reach."""
         return DriverConfig(
             host=self.robot,
             mounting=self.mounting,
@@ -79,14 +79,14 @@ class Rig:
         )
 
     def motion_words(self, reach: tuple[tuple[float, float], ...]) -> str:
-        """Return where the paddle may move and how fast, in words."""
+        """Return a text for a person: where the paddle may move and how fast."""
         (left, low), (right, high) = np.min(reach, 0), np.max(reach, 0)
         stop = LATEST * self.limits.speed + self.limits.stopping_distance
         return (
             f"The paddle will move within x {left:+.2f} .. {right:+.2f} m and y "
             f"{low:+.2f} .. {high:+.2f} m of the table's centre, with up to "
-            f"{self.limits.speed} m/s; stopped within {LATEST} s, it comes to rest "
-            f"{stop:.2f} m on. The arm sweeps the space above and behind it."
+            f"{self.limits.speed} m/s. A stop begins within {LATEST} s, and the paddle "
+            f"comes to rest within {stop:.2f} m. The arm moves above and behind it."
         )
 
     @property
@@ -95,25 +95,28 @@ class Rig:
         return {int(k): np.array(four) for k, four in self.tags.items()}
 
     def save(self, path: Path) -> None:
-        """Write it as JSON."""
+        """Write the rig as JSON."""
         save_rig(path, "table", asdict(self))
 
     @staticmethod
     def load(path: Path) -> Rig:
-        """Read it.
+        """Read a rig.
 
         Raises:
-            ValueError: a file that is missing, of another format, or holds something
-                that makes no sense, named.
+            ValueError: The file is missing, or its format or a field is wrong.
         """
         return Rig.from_fields(path, load_rig(path, "table"))
 
     @staticmethod
     def from_fields(path: Path, given: dict[str, Any]) -> Rig:
-        """Return the rig of the fields that a file holds.
+        """Return the rig with the fields of a file.
+
+        Args:
+            path: Path of the file, for messages.
+            given: Fields by name.
 
         Raises:
-            ValueError: something is missing or makes no sense, named.
+            ValueError: A field is missing or wrong; the message names it.
         """
         try:
             return _rig(given)
@@ -122,7 +125,7 @@ class Rig:
 
 
 def _smoothing(given: Any) -> Smoothing:
-    """Return the filter of a file; older ones hold the time of a low pass alone."""
+    """Return the filter of a file; older files hold only the time of a low pass."""
     if isinstance(given, dict):
         return Smoothing(**given)
     return Smoothing("low_pass", float(given)) if given else Smoothing()

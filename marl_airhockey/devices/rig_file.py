@@ -1,4 +1,4 @@
-"""Files of rigs: JSON with a format and the kind of rig."""
+"""Files of rigs: JSON objects with a format and the kind of the rig."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def save_rig(path: Path, kind: str, fields: Mapping[str, Any]) -> None:
     """Write the fields of a rig.
 
     Args:
-        path: of the file; its folder is made.
-        kind: one of `WRITERS`.
-        fields: by name.
+        path: Path of the file; its folder is created.
+        kind: Kind of the rig, a key of `WRITERS`.
+        fields: Fields by name.
     """
     whole = {"format": FORMAT, "kind": kind, **fields}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -32,7 +32,7 @@ def load_rig(path: Path, kind: str) -> dict[str, Any]:
     """Read the fields of a rig.
 
     Raises:
-        ValueError: a file that is missing, no rig, of another format or kind.
+        ValueError: The file is missing or no rig, or its format or kind is wrong.
     """
     try:
         given = json.loads(path.read_text())
@@ -46,19 +46,24 @@ def load_rig(path: Path, kind: str) -> dict[str, Any]:
 
 
 def rig_fields(path: Path, given: Any, kind: str) -> dict[str, Any]:
-    """Return the fields of a rig that a file holds as a JSON object.
+    """Return the fields of the rig in a JSON object of a file.
+
+    Args:
+        path: Path of the file, for messages.
+        given: Content of the file.
+        kind: Expected kind of the rig, a key of `WRITERS`.
 
     Raises:
-        ValueError: it is none, or of another format or kind.
+        ValueError: The content is no rig, or its format or kind is wrong.
     """
     given = dict(given) if isinstance(given, dict) else given
     found = given.pop("format", None) if isinstance(given, dict) else None
     if found != FORMAT:
-        raise ValueError(f"{path}: format {found!r}, this version reads {FORMAT}")
+        raise ValueError(f"{path}: format {found!r}, expected {FORMAT}")
     other = given.pop("kind", "table")
     if other != kind:
         raise ValueError(
-            f"{path}: this is the rig of a {other}, and that of a {kind} is needed; "
+            f"{path}: this is the rig of a {other}, expected that of a {kind}; "
             f"{WRITERS[kind]} writes one"
         )
     return dict(given)

@@ -23,12 +23,12 @@ from marl_airhockey.types import Array
 
 
 class PublishedTable(EmptyTable):
-    """Table under the arm that tells another process where the paddle is.
+    """Table under the arm that reports the paddle to another process.
 
     Args:
         setup: Setup of the lab.
-        block: Memory for time, s, position (3,), m, and velocity (2,), m/s, in the
-            table frame.
+        block: Memory for time, s, position (3,), m, and velocity (2,), m/s, table
+            frame.
     """
 
     def __init__(self, setup: LabSetup, block: Block) -> None:
@@ -44,14 +44,14 @@ class PublishedTable(EmptyTable):
 
 
 def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
-    """Serve an arm, tell its address, and go on until the pipe's other end closes."""
+    """Serve an arm and send its address; return when the pipe's other end closes."""
     raise_priority()
     table = PublishedTable(setup, Block(np.frombuffer(memory)))
     controller = Controller(setup.make_arm(table))
     arm, served = controller.arm, Ports(controller)
 
     def guide(place: list[float]) -> None:
-        """Move as somebody guides the arm by hand."""
+        """Move the arm as if it were guided by hand."""
         arm.motion = Line(setup.mounting.pose(np.array(place)), 0.25, 1.0)
 
     orders: dict[str, Callable[[Any], None]] = {
@@ -66,7 +66,7 @@ def run_arm(setup: LabSetup, memory: Any, pipe: Connection) -> None:
         def obey() -> None:
             try:
                 name, value = pipe.recv()
-            except (EOFError, OSError):  # Whoever opened the lab is gone.
+            except (EOFError, OSError):  # The process of the lab has ended.
                 ended.set()
                 return
             orders[name](value)

@@ -1,7 +1,7 @@
-"""Camera of the lab: pictures of a simulated scene, as a real camera would take them.
+"""Camera of the lab: frames of a simulated scene, like those of a real camera.
 
-There is a lens, noise, shading, motion blur and shadows. What does not move is drawn
-once; in each picture only what moves is drawn anew.
+They have lens distortion, noise, shading, motion blur and shadows. Static objects are
+drawn once; only moving objects are drawn in each frame.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ PADDLE = (70, 165, 60)
 """Colours: blue, green, red"""
 NOISE = 4.0
 """Standard deviation of a pixel's noise"""
-BANK = 6
-"""Number of different noises"""
+NOISES = 6
+"""Number of different noise images"""
 SHADOW = np.array([0.004, -0.006])
-"""Way of a shadow for each cm of height or so, m"""
+"""Offset (2,) of the shadow of a body about 1 cm high, m"""
 PADDLE_TOP = 0.06
 """Height of a paddle's top, m"""
 AROUND = 24
-"""Pixels about what moves that are drawn anew"""
+"""Margin around moving objects that is drawn in each frame, px"""
 
 What = TypeVar("What")
-"""What is before a camera in the middle of an exposure"""
+"""Moving objects before a camera in the middle of an exposure"""
 
 
 class LabCamera(ABC, Generic[What]):
     """Camera over a simulated scene.
 
     Args:
-        view: where it is.
-        exposure: s.
-        seed: of its noise.
+        view: View of the camera.
+        exposure: Exposure time, s.
+        seed: Seed of the image noise.
     """
 
     def __init__(self, view: View, exposure: float = 1 / 120, seed: int = 0) -> None:
@@ -58,31 +58,36 @@ class LabCamera(ABC, Generic[What]):
 
     @abstractmethod
     def _draw_still(self, scene: Array, view: View) -> None:
-        """Draw what does not move."""
+        """Draw the static objects.
+
+        Args:
+            scene: Image (H, W, 3) that is drawn on.
+            view: View of the image.
+        """
 
     @abstractmethod
     def _draw(
         self, part: Array, seen: What, later: float, corner: tuple[int, int]
     ) -> None:
-        """Draw what moves, a time after the middle of the exposure, s.
+        """Draw the moving objects at one time during the exposure.
 
         Args:
-            part: of the picture.
-            seen: then.
-            later: that time.
-            corner: pixel of the picture at which the part begins.
+            part: Part (h, w, 3) of the image that is drawn on.
+            seen: Moving objects in the middle of the exposure.
+            later: Time since the middle of the exposure, s.
+            corner: Upper left pixel (x, y) of the part in the image.
         """
 
     @abstractmethod
     def _outlines(self, seen: What) -> list[Array]:
-        """Return pixels (n, 2) about each thing that moves, what hides others last."""
+        """Return outlines (n, 2), px, of the moving objects, those in front last."""
 
     @abstractmethod
     def _speed(self, seen: What) -> float:
-        """Return the speed of the fastest thing, m/s."""
+        """Return the speed of the fastest object, m/s."""
 
     def move(self, view: View) -> None:
-        """Stand elsewhere from now on."""
+        """Change the camera's view."""
         self.view = view
         width, height = view.lens.size
         shape = height, width
@@ -95,21 +100,25 @@ class LabCamera(ABC, Generic[What]):
         scene = self._still * self._light
         noises = [
             self._rng.normal(0, NOISE, (*shape, 3)).astype(np.float32)
-            for _ in range(BANK)
+            for _ in range(NOISES)
         ]
         self._noise = [n.astype(np.int16) for n in noises]
         self._empty = [np.clip(scene + n, 0, 255).astype(np.uint8) for n in noises]
 
     def show_board(self, number: int | None) -> None:
-        """Hold a ChArUco board before the camera, a number of ways; None for away."""
+        """Show a ChArUco board to the camera, or remove it.
+
+        Args:
+            number: Number of the board's pose; None without a board.
+        """
         self._shown = None
         if number is None:
             return
         rng, size = np.random.default_rng(number), np.array(SQUARES) * SQUARE
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * size - size / 2
         rotation, _ = cv2.Rodrigues(rng.uniform(-0.45, 0.45, 3))
-        place = np.array([0.22 * (number % 3 - 1), 0.15 * (number // 3 % 3 - 1), 0.62])
-        board = np.column_stack([corners, np.zeros(4)]) @ rotation.T + place
+        shift = np.array([0.22 * (number % 3 - 1), 0.15 * (number // 3 % 3 - 1), 0.62])
+        board = np.column_stack([corners, np.zeros(4)]) @ rotation.T + shift
         flat = enlarged(self.view)
         pixels, _ = cv2.projectPoints(
             board, np.zeros(3), np.zeros(3), flat.lens.arrays[0], None
@@ -125,13 +134,13 @@ class LabCamera(ABC, Generic[What]):
         self._shown = through_lens(self.view, scene) * self._light
 
     def photograph(self, seen: What, number: int = 0) -> Array:
-        """Return (H, W, 3) uint8 of what is before the camera.
+        """Return the image (H, W, 3) uint8 of the scene.
 
         Args:
-            seen: in the middle of the exposure.
-            number: of the picture, which decides its noise.
+            seen: Moving objects in the middle of the exposure.
+            number: Number of the frame, which selects its noise.
         """
-        k = number % BANK
+        k = number % NOISES
         if self.dark:
             return np.asarray(np.clip(self._noise[k], 0, 255).astype(np.uint8))
         if self._shown is not None:
@@ -149,28 +158,28 @@ class LabCamera(ABC, Generic[What]):
         return image
 
     def _expose(self, seen: What, box: tuple[int, int, int, int]) -> Array:
-        """Return what a part of the picture sums up over the exposure."""
+        """Return a part (left, top, right, bottom) of the image with motion blur."""
         x, y, right, bottom = box
         total = np.zeros((bottom - y, right - x, 3), np.float32)
-        # One moment for each two pixels that something moves.
-        way = self._speed(seen) * self._exposure * self.view.scale(np.zeros(2)) / 2
-        moments = int(np.clip(np.ceil(way), 1, 8))
-        for share in (np.arange(moments) + 0.5) / moments - 0.5:
+        # One sample for every two pixels of movement.
+        distance = self._speed(seen) * self._exposure * self.view.scale(np.zeros(2)) / 2
+        samples = int(np.clip(np.ceil(distance), 1, 8))
+        for share in (np.arange(samples) + 0.5) / samples - 0.5:
             part = self._still[y:bottom, x:right].copy()
             self._draw(part, seen, share * self._exposure, (x, y))
             total += part
-        return total / moments
+        return total / samples
 
-    def _disc(self, place: Array, radius: float) -> Array:
-        """Return pixels about a disc that lies at a place."""
-        around = place + 1.2 * radius * CIRCLE
+    def _disc(self, position: Array, radius: float) -> Array:
+        """Return an outline (n, 2), px, around a disc on the table."""
+        around = position + 1.2 * radius * CIRCLE
         return self.view.project(np.column_stack([around, np.zeros(len(around))]))
 
 
 def _box(
     pixels: Array, shape: tuple[int, ...], margin: int
 ) -> tuple[int, int, int, int]:
-    """Return the part of a picture about some pixels: left, top, right, bottom."""
+    """Return the part of an image around some pixels: left, top, right, bottom."""
     low, high = pixels.min(0) - margin, pixels.max(0) + margin
     return (
         max(int(low[0]), 0),

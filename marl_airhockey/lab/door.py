@@ -1,7 +1,7 @@
-"""Door: a loopback port by which other processes find a service and give it orders.
+"""Door: a loopback port at which other processes send orders to a service.
 
-An order is a line of JSON, {"do": NAME, ...}, and so is its answer; {"error": ...} says
-why it was refused.
+An order is a line of JSON, {"do": NAME, ...}, and so is its answer. The answer to a
+refused order is {"error": REASON}.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from pathlib import Path
 from typing import Any
 
 Answer = Callable[[dict[str, Any]], dict[str, Any]]
-"""Function of an order, which returns its answer"""
+"""Function that takes an order and returns its answer"""
 WAIT = 10.0
 """Longest time until an answer, s"""
 
 
 @contextmanager
 def open_door(answer: Answer, file: Path | None = None) -> Iterator[int]:
-    """Open a door; give its port.
+    """Open a door and yield its port.
 
     Args:
         answer: Function that answers orders, called in threads of the clients. Its
             ValueError, RuntimeError, KeyError or TypeError becomes the error.
-        file: File in which other commands find the port; None for none.
+        file: File in which other commands find the port; None for no file.
     """
 
     class Visit(socketserver.StreamRequestHandler):
@@ -70,7 +70,7 @@ class DoorClient:
         name: Name of the service, for messages.
 
     Raises:
-        OSError: Nobody answers there.
+        OSError: No service listens at the port.
     """
 
     def __init__(self, port: int, name: str) -> None:
@@ -88,13 +88,13 @@ class DoorClient:
         self._file.write(json.dumps({"do": do, **order}).encode() + b"\n")
         self._file.flush()
         line = self._file.readline()
-        answer = json.loads(line) if line else {"error": "it has ended"}
+        answer = json.loads(line) if line else {"error": "the service has ended"}
         if "error" in answer:
             raise RuntimeError(f"{self._name}: {answer['error']}")
         return dict(answer)
 
     def close(self) -> None:
-        """Leave the service."""
+        """Close the connection."""
         self._file.close()
         self._socket.close()
 

@@ -1,4 +1,4 @@
-"""Drawing of what stands before the lab's cameras."""
+"""Drawing of the objects before the lab's cameras."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from marl_airhockey.devices.vision.lens import Lens, View
 from marl_airhockey.types import Array
 
 SHIFT = 4
-"""Binary digits below a pixel with which edges are drawn"""
+"""Fractional bits of the pixel coordinates of edges"""
 OVER, MARGIN = 3, 80
-"""Times that a scene is drawn larger than it is seen, and pixels beyond its edges"""
+"""Oversampling factor of drawn scenes, and their margin, px"""
 
 
 def enlarged(view: View) -> View:
-    """Return the view without distortion in which scenes are drawn, before the lens."""
+    """Return the larger view without distortion in which scenes are drawn."""
     width, height = view.lens.size
     larger = view.lens.arrays[0].copy()
     larger[:2, 2] += MARGIN
@@ -30,7 +30,7 @@ def enlarged(view: View) -> View:
 
 
 def through_lens(view: View, scene: Array) -> Array:
-    """Return a scene, drawn larger, as the lens shows it."""
+    """Return a scene of the `enlarged` view as an image (H, W, 3) of a view."""
     width, height = view.lens.size
     matrix, distortion = view.lens.arrays
     larger = enlarged(view).lens.arrays[0]
@@ -46,9 +46,9 @@ def through_lens(view: View, scene: Array) -> Array:
 
 def draw_polygon(image: Array, pixels: Array, colour: tuple[int, int, int]) -> None:
     """Fill a polygon (n, 2), px."""
-    # The pixels on its edge are painted whole: half a pixel all around is too much.
-    ways = pixels - pixels.mean(0)
-    inner = pixels - 0.5 * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    # OpenCV paints pixels on the edge completely, so shrink the polygon by 0.5 px.
+    offsets = pixels - pixels.mean(0)
+    inner = pixels - 0.5 * offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
     corners = np.round(inner * 2**SHIFT).astype(np.int32)
     cv2.fillPoly(image, [corners], colour, cv2.LINE_AA, SHIFT)
 
@@ -61,13 +61,22 @@ def fill(
     colour: tuple[int, int, int],
     corner: tuple[int, int] = (0, 0),
 ) -> None:
-    """Fill a polygon (n, 2), table frame, at a height."""
+    """Fill a polygon at a height above the table.
+
+    Args:
+        image: Image (h, w, 3) that is drawn on.
+        view: View of the whole image.
+        corners: (n, 2) corners, table frame, m.
+        height: Height above the table, m.
+        colour: Blue, green, red.
+        corner: Upper left pixel (x, y) of ``image`` in the whole image.
+    """
     points = np.column_stack([corners, np.full(len(corners), height)])
     draw_polygon(image, view.project(points) - corner, colour)
 
 
 def shade(image: Array, view: View, corners: Array, corner: tuple[int, int]) -> None:
-    """Darken a polygon (n, 2), table frame."""
+    """Darken a polygon (n, 2), table frame, m, as a shadow."""
     drawn = np.zeros(image.shape[:2], np.uint8)
     points = np.column_stack([corners, np.zeros(len(corners))])
     pixels = np.round((view.project(points) - corner) * 2**SHIFT).astype(np.int32)
@@ -78,12 +87,12 @@ def shade(image: Array, view: View, corners: Array, corner: tuple[int, int]) -> 
 
 
 def paste_tag(image: Array, view: View, number: int, place: Array) -> None:
-    """Draw a printed tag with its white rim."""
+    """Draw a printed tag with a white rim around (2,), table frame, m."""
     rim = place + 1.4 * (tag_corners(place) - place)
     fill(image, view, rim, 0.0, (250, 250, 250))
-    words = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    markers = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
     size = 240
-    tag = cv2.aruco.generateImageMarker(words, number, size)
+    tag = cv2.aruco.generateImageMarker(markers, number, size)
     flat = np.array([(0, 0), (size, 0), (size, size), (0, size)], np.float32) - 0.5
     corners = tag_corners(place)
     pixels = view.project(np.column_stack([corners, np.zeros(4)])).astype(np.float32)

@@ -1,8 +1,8 @@
 """Emulated robot: a driver and its controller in this process, in emulated time.
 
-The driver is the one that moves a real arm, the controller is that of `airhockey
-ur-emulator`; between them is `InProcessArm` instead of ur_rtde. Ten minutes of driving
-take half a minute, and the same calls give the same motion.
+The driver is that of a real arm, the controller that of `airhockey ur-emulator`.
+`InProcessArm` connects them instead of ur_rtde. Ten minutes of driving take half a
+minute, and the same calls give the same motion.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ class EmulatedRobot:
     """Emulated robot over an empty table.
 
     Args:
-        preset: Limits and settings; None for the usual ones.
-        smoothing: Filter of the commands; None for none.
-        setup: Lab in which it stands; None for the usual one.
-        away: Distance by which the arm stands away from its table, m.
+        preset: Limits and settings; None for the defaults.
+        smoothing: Filter of the commands; None for no filter.
+        setup: Setup of the lab; None for the default.
+        away: Additional distance of the arm from the table, m.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class EmulatedRobot:
         self.start_driver()
 
     def start_driver(self) -> None:
-        """Start a driver, as a new process does; it replaces the present one."""
+        """Start a driver, as a new process does; it replaces the current one."""
         self._recoveries, self._enabled = 0, False
         self._box = Mailbox(Mailbox.allocate())
         self.driver = Driver(self.config, self.arm, self._box, lambda: self.arm.now)
         self.driver_runs = True
-        """False for a driver whose process was killed or is held up."""
+        """False for a driver whose process was killed or stalls."""
         self._request(np.zeros(2), 0.0)
         self.driver.cycle()
 
@@ -91,7 +91,7 @@ class EmulatedRobot:
 
     @property
     def fault(self) -> Fault:
-        """Reason of a HOLD or a FAULT."""
+        """Reason for a HOLD or a FAULT."""
         return self.driver.supervisor.fault
 
     @property
@@ -105,26 +105,31 @@ class EmulatedRobot:
 
     @property
     def true_position(self) -> Array:
-        """(3,) the paddle as it is, table frame, m."""
+        """(3,) true position of the paddle, table frame, m."""
         return self.setup.mounting.to_table(self.controller.arm.pose[:3, 3])
 
     @property
     def true_velocity(self) -> Array:
-        """(2,) its velocity, table frame, m/s."""
+        """(2,) true velocity of the paddle, table frame, m/s."""
         return self.setup.mounting.rotate_to_table(self.controller.arm.twist)[:2]
 
     def enable(self) -> None:
-        """Take commands from now on."""
+        """Accept commands from now on."""
         self._enabled = True
         self._request(np.zeros(2), 0.0)
 
     def disable(self) -> None:
-        """Brake and take no commands."""
+        """Brake and accept no commands."""
         self._enabled = False
         self._request(np.zeros(2), 0.0)
 
     def send_action(self, velocity: Array, seconds: float = 0.05) -> None:
-        """Command a velocity (2,), table frame, m/s, to be reached in some seconds."""
+        """Command a velocity.
+
+        Args:
+            velocity: (2,) target velocity, table frame, m/s.
+            seconds: Time in which it is to be reached, s.
+        """
         self._request(velocity, seconds)
 
     def _request(self, velocity: Array, seconds: float) -> None:
@@ -143,7 +148,7 @@ class EmulatedRobot:
         FAULTS[fault].switch(self.controller, on)
 
     def advance(self, seconds: float) -> None:
-        """Let emulated time pass."""
+        """Advance emulated time by some seconds."""
         for _ in range(round(seconds / DT)):
             if self._ticks % EVERY == 0 and self.driver_runs:
                 self.driver.cycle()
@@ -153,14 +158,20 @@ class EmulatedRobot:
     def drive_to(
         self, position: Array, seconds: float = 5.0, near: float = 0.004
     ) -> bool:
-        """Move the paddle to a position (2,), m; return True if it arrived."""
+        """Move the paddle to a position; return True if it arrived.
+
+        Args:
+            position: (2,) target position, table frame, m.
+            seconds: Longest time of the movement, s.
+            near: Largest distance from the target that counts as arrived, m.
+        """
         self.enable()
         until = self.now + seconds
         while self.now < until:
-            way = np.asarray(position) - self.true_position[:2]
-            left = float(np.linalg.norm(way))
+            error = np.asarray(position) - self.true_position[:2]
+            left = float(np.linalg.norm(error))
             if left < near and np.linalg.norm(self.true_velocity) < 0.01:
                 return True
-            self.send_action(way * min(0.25 / max(left, 1e-9), 3.0), 0.02)
+            self.send_action(error * min(0.25 / max(left, 1e-9), 3.0), 0.02)
             self.advance(0.02)
         return False

@@ -1,4 +1,4 @@
-"""Server of a camera's pictures, as a camera on this machine would give them."""
+"""Server of a simulated camera's frames, for `StreamSource`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from marl_airhockey.devices.camera.sources import pack_frame
 
 
 class FrameServer:
-    """Server of a stream of frames; each client gets the newest that it has not seen.
+    """Server of a stream of frames; each client gets the newest one it has not got yet.
 
-    It listens on the loopback address alone.
+    It listens only on the loopback address.
 
     Args:
-        latency: time from when a frame was taken until clients get it, s.
+        latency: Time from when a frame is taken until it is sent to clients, s.
     """
 
     def __init__(self, latency: float) -> None:

@@ -1,4 +1,4 @@
-"""Hand's camera: pictures of a person's hand that moves a paddle on a field."""
+"""Hand's camera: frames of a person's hand that moves a paddle on a field."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ SKIN = (120, 150, 205)
 RIM = 0.07
 """Distance of the tags' middles from the field's edge, m"""
 HAND_HEIGHTS = np.array([0.10, 0.10, 0.14, 0.14])
-"""Heights of the corners of hand and forearm, m"""
+"""Heights of the corners of hand and forearm above the field, m"""
 
 
 def hand_view() -> View:
-    """Return the true view of the camera over the field."""
+    """Return the true view of the camera above the field."""
     matrix = ((640.0, 0.0, 318.0), (0.0, 640.0, 238.0), (0.0, 0.0, 1.0))
     lens = Lens(matrix, (-0.08, 0.03, 0.0, 0.0, 0.0), (640, 480))
     rotation, _ = cv2.Rodrigues(np.array([np.pi - 0.05, 0.02, -0.03]))
@@ -43,9 +43,9 @@ def hand_view() -> View:
 
 
 def hand_tag_places() -> dict[int, Array]:
-    """Return the middles (2,) of the tags about the field, m, by their numbers.
+    """Return the centres (2,) of the tags around the field, m, by their numbers.
 
-    None is at the near edge, over which the arm reaches.
+    There are no tags at the near edge, over which the arm reaches.
     """
     x, y = FIELD[0] / 2, FIELD[1] / 2 + RIM
     sides = [(-0.8 * x, y), (0.8 * x, y), (-0.8 * x, -y), (0.8 * x, -y)]
@@ -54,33 +54,33 @@ def hand_tag_places() -> dict[int, Array]:
 
 
 class SeenHand(NamedTuple):
-    """Hand in the middle of an exposure, field's frame."""
+    """Hand in the middle of an exposure, field frame."""
 
     place: Array | None
-    """(2,) of the paddle, m; None for a hand that is away"""
+    """(2,) position of the paddle, m; None without a hand"""
     velocity: Array
-    """(2,) m/s"""
+    """(2,) velocity of the paddle, m/s"""
 
 
 class HandCamera(LabCamera[SeenHand]):
-    """Camera over a field on which a hand moves a paddle."""
+    """Camera above a field on which a hand moves a paddle."""
 
     def _draw_still(self, scene: Array, view: View) -> None:
         half = np.array(FIELD) / 2
         corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         fill(scene, view, corners * half, 0.0, FELT)
-        for number, place in hand_tag_places().items():
-            paste_tag(scene, view, number, place)
+        for number, centre in hand_tag_places().items():
+            paste_tag(scene, view, number, centre)
 
     def _draw(
         self, part: Array, seen: SeenHand, later: float, corner: tuple[int, int]
     ) -> None:
         if seen.place is None:
             return
-        place = seen.place + later * seen.velocity
-        shade(part, self.view, place + 4 * SHADOW + RADIUS * CIRCLE, corner)
-        fill(part, self.view, place + RADIUS * CIRCLE, PADDLE_TOP, PADDLE, corner)
-        pixels = self.view.project(np.column_stack([_forearm(place), HAND_HEIGHTS]))
+        position = seen.place + later * seen.velocity
+        shade(part, self.view, position + 4 * SHADOW + RADIUS * CIRCLE, corner)
+        fill(part, self.view, position + RADIUS * CIRCLE, PADDLE_TOP, PADDLE, corner)
+        pixels = self.view.project(np.column_stack([_forearm(position), HAND_HEIGHTS]))
         draw_polygon(part, pixels - corner, SKIN)
 
     def _outlines(self, seen: SeenHand) -> list[Array]:
@@ -93,7 +93,7 @@ class HandCamera(LabCamera[SeenHand]):
         return float(np.linalg.norm(seen.velocity))
 
 
-def _forearm(place: Array) -> Array:
-    """Return the corners (4, 2) of hand and forearm, which come from the near edge."""
+def _forearm(position: Array) -> Array:
+    """Return the corners (4, 2), m, of hand and forearm for a paddle position (2,)."""
     offsets = [(-0.005, 0.02), (-0.005, -0.02), (-0.45, -0.025), (-0.45, 0.065)]
-    return np.asarray(place + np.array(offsets))
+    return np.asarray(position + np.array(offsets))

@@ -1,4 +1,4 @@
-"""Lab: its processes, and the door by which others find it and ask for things."""
+"""Lab: its processes, and the door at which other processes send it orders."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ from marl_airhockey.lab.table_process import run_table
 ANSWER = 5.0
 """Longest time until a process of the lab answers, s"""
 START = 300.0
-"""Longest time until a lab has started, s: the first time much is compiled"""
+"""Longest time until a lab has started, s; the first start compiles its backend"""
 
 
 def port_file() -> Path:
-    """Return the file in which a running lab tells where its door is."""
+    """Return the file in which a running lab writes the port of its door."""
     return cache_folder() / "lab.json"
 
 
 class Lab:
-    """Lab that runs in processes of its own.
+    """Lab that runs in its own processes.
 
-    They end when this one does, however it does.
+    They end when this process ends, even if it is killed.
 
     Args:
-        setup: of the lab.
-        seed: of what its table is like.
-        frame_rate: pictures a second.
+        setup: Setup of the lab; None for the default.
+        seed: Seed of the table's physical parameters.
+        frame_rate: Frame rate of the cameras, 1/s.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Lab:
     ) -> None:
         self.setup = setup or LabSetup()
         context = multiprocessing.get_context("spawn")
-        # Kept, as memory that nobody holds is given to the next who asks.
+        # Referenced here, as memory without a reference is freed and used again.
         self._memory = memory = context.Array("d", 7, lock=False)
         self._lock = threading.Lock()
         self._frame_rate, self._seed = frame_rate, seed
@@ -72,22 +72,23 @@ class Lab:
         """Return the next answer of a process.
 
         Raises:
-            RuntimeError: it does not answer, or has failed.
+            RuntimeError: The process does not answer, or has failed.
         """
         try:
             answer = pipe.recv() if pipe.poll(seconds) else None
         except EOFError:
             answer = None
         if answer is None or "error" in answer:
-            why = answer["error"] if answer else "it does not answer"
+            why = answer["error"] if answer else "its process does not answer"
             raise RuntimeError(f"lab: {why}")
         return dict(answer)
 
     def ask(self, order: dict[str, Any]) -> dict[str, Any]:
-        """Do what a client asks for and return the answer.
+        """Carry out an order of a client and return the answer.
 
         Raises:
-            ValueError: an order that there is not.
+            ValueError: The order or the fault is unknown, or the path is invalid.
+            RuntimeError: A process does not answer.
         """
         what = order.get("do")
         if what == "info":
@@ -95,7 +96,9 @@ class Lab:
         if what == "survey":
             return self._survey()
         if what == "fault" and order.get("name") not in FAULTS:
-            raise ValueError(f"fault {order.get('name')!r}; there are: {[*FAULTS]}")
+            raise ValueError(
+                f"fault {order.get('name')!r}: expected one of {[*FAULTS]}"
+            )
         with self._lock:
             if what == "fault" and order["name"] in ARM_FAULTS:
                 self._arm.send((order["name"], bool(order["on"])))
@@ -119,10 +122,10 @@ class Lab:
         }
 
     def _move_hand(self, order: dict[str, Any]) -> dict[str, Any]:
-        """Move the hand, or tell where its camera is; it comes when it is first asked.
+        """Move the hand and return its camera's port; start its process if needed.
 
         Raises:
-            ValueError: a path that there is not.
+            ValueError: The path is invalid.
         """
         if order["do"] == "hand":
             path_of(order)
@@ -139,24 +142,24 @@ class Lab:
         return {**self._expect(self._hand), "camera": self._hand_port}
 
     def _survey(self) -> dict[str, Any]:
-        """Return what a tool that touches the table at twelve places would tell."""
+        """Return the noisy poses of a tool that touches the table at twelve points."""
         rng = np.random.default_rng(12)
         low, high = np.min(self.setup.seat.reach, 0), np.max(self.setup.seat.reach, 0)
-        places = np.stack(
+        points = np.stack(
             np.meshgrid(*np.linspace(low, high, 4).T[:, [0, 1, 3]]), -1
         ).reshape(-1, 2)
         mounting = self.setup.mounting
-        touched = [mounting.pose(place)[:3] for place in places]
-        noisy = np.array(touched) + rng.normal(0.0, 0.0002, (len(places), 3))
+        touched = [mounting.pose(point)[:3] for point in points]
+        noisy = np.array(touched) + rng.normal(0.0, 0.0002, (len(points), 3))
         return {
-            "places": places.tolist(),
+            "places": points.tolist(),
             "touched": noisy.tolist(),
             "tool": list(mounting.tool),
         }
 
     @property
     def alive(self) -> list[bool]:
-        """True for each process that runs."""
+        """True for each running process."""
         return [process.is_alive() for process in self._processes]
 
     def close(self) -> None:
@@ -179,11 +182,11 @@ class Lab:
 
 @contextmanager
 def served(lab: Lab, announce: bool = True) -> Iterator[int]:
-    """Open a lab's door on the loopback address; give its port.
+    """Open a lab's door on the loopback address and yield its port.
 
     Args:
-        lab: whose door it is.
-        announce: whether other commands are to find it by the `port_file`.
+        lab: Lab that answers the orders.
+        announce: Whether to write the `port_file`, by which other commands find it.
     """
     with open_door(lab.ask, port_file() if announce else None) as port:
         yield port
@@ -196,7 +199,7 @@ class LabClient(DoorClient):
         port: Port of its door.
 
     Raises:
-        OSError: Nobody answers there.
+        OSError: No lab listens at the port.
     """
 
     def __init__(self, port: int) -> None:
@@ -204,7 +207,7 @@ class LabClient(DoorClient):
 
     @staticmethod
     def find() -> LabClient | None:
-        """Return a client of the lab that runs on this machine; None without one."""
+        """Return a client of the lab that runs on this machine; None without a lab."""
         port = port_in(port_file())
         try:
             return None if port is None else LabClient(port)
@@ -213,10 +216,10 @@ class LabClient(DoorClient):
 
 
 def wait_for_lab(seconds: float = START) -> LabClient:
-    """Return a client of a lab that is starting.
+    """Wait for a lab that is starting and return a client.
 
     Raises:
-        RuntimeError: it does not come up.
+        RuntimeError: The lab does not start in time.
     """
     until = time.monotonic() + seconds
     while time.monotonic() < until:
@@ -224,4 +227,4 @@ def wait_for_lab(seconds: float = START) -> LabClient:
         if client is not None:
             return client
         time.sleep(0.05)
-    raise RuntimeError("lab: it did not start")
+    raise RuntimeError(f"lab: it did not start within {seconds:.0f} s")

@@ -1,4 +1,4 @@
-"""Setup: what stands in the virtual lab, and where; nobody outside is told."""
+"""Setup: the devices of the virtual lab and their true poses, hidden from clients."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from marl_airhockey.lab.ur_controller.plant import EmptyTable, Plant
 from marl_airhockey.types import Array
 
 TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
-"""Pose of the paddle's foot in the flange's frame, m and rad"""
+"""Pose of the paddle's foot, flange frame, m and rad"""
 ELBOW_UP = (2.9, -1.13, 1.94, -2.47, -1.57, 4.48)
-"""Angles from which the search for those at the start begins, rad. With the elbow up no
-joint is faster than 0.92 pi rad/s at 0.7 m/s anywhere in the reach; with it down, the
-arm is stretched at the far end, and they are."""
+"""Initial angles of the search for the start angles, rad. With the elbow up, no joint
+is faster than 0.92 pi rad/s at 0.7 m/s anywhere in the reach. With the elbow down, the
+arm is stretched at the far end, and joints are faster."""
 LIFT = 0.02
 """Height of the paddle above the table when the lab opens, m"""
 
@@ -34,16 +34,16 @@ class LabSetup:
     table: str = "full_size"
     """Name of the table's preset"""
     tilt: float = TILT
-    """deg"""
+    """Tilt of the table, deg"""
     plant: str = "numba"
     """Name of the backend that moves puck and paddle"""
     latency: float = 0.028
-    """Time from the middle of an exposure until the picture can be had, s: half of the
+    """Time from the middle of an exposure until the frame is sent, s: half of the
     exposure, the readout and the transfer"""
 
     @cached_property
     def geometry(self) -> Table:
-        """Table."""
+        """Geometry of the table."""
         return TABLES[self.table]
 
     @cached_property
@@ -53,12 +53,12 @@ class LabSetup:
 
     @cached_property
     def home(self) -> Array:
-        """(2,) place at which the paddle rests, table frame, m."""
+        """(2,) rest position of the paddle, table frame, m."""
         return np.asarray(np.mean(np.asarray(self.seat.reach), 0))
 
     @cached_property
     def mounting(self) -> Mounting:
-        """Where the table truly lies in the arm's base frame."""
+        """True pose of the table in the arm's base frame."""
         return nominal_mounting(self.geometry, self.tilt)
 
     def make_table(self) -> EmptyTable:
@@ -70,10 +70,10 @@ class LabSetup:
         """Return the arm with its paddle above its home position.
 
         Args:
-            plant: What the paddle touches; None for an empty table.
+            plant: Model of what the paddle touches; None for an empty table.
 
         Raises:
-            RuntimeError: scipy is missing, with the command that installs it.
+            RuntimeError: scipy is missing; the message has the command to install it.
             ValueError: The arm does not reach its table.
         """
         require("scipy", "hardware")

@@ -1,4 +1,4 @@
-"""Table's camera: pictures of the lab's table, with the arm in the way."""
+"""Table's camera: frames of the lab's table, which the arm hides in part."""
 
 from __future__ import annotations
 
@@ -24,57 +24,57 @@ from marl_airhockey.types import Array
 PUCK, ARM = (42, 40, 205), (96, 92, 90)
 """Colours: blue, green, red"""
 TAGS_BESIDE = 0.075
-"""Distance of the tags' middles from the table's edge, m"""
+"""Distance of the tags' centres from the table's edge, m"""
 PUCK_HEIGHT = 0.003
 """Height of a puck's rim, m"""
 ARM_HEIGHTS = np.array([0.10, 0.10, 0.35, 0.35])
-"""Heights of the corners of the arm's last link, m"""
+"""Heights of the corners of the arm's last link above the table, m"""
 
 
 def lab_view(table: Table) -> View:
-    """Return the true view of the lab's camera over its table."""
+    """Return the true view of the lab's camera above its table."""
     focal = 602.0 * 1.9304 / max(table.size[0], 1.2)
     matrix = ((focal, 0.0, 322.0), (0.0, focal, 243.0), (0.0, 0.0, 1.0))
     lens = Lens(matrix, (-0.10, 0.04, 0.0, 0.0, 0.0), (640, 480))
     rotation, _ = cv2.Rodrigues(np.array([np.pi + 0.06, 0.03, 0.02]))
     vector, _ = cv2.Rodrigues(rotation)
-    place = np.array([-0.03, 0.05, 2.15])
+    centre = np.array([-0.03, 0.05, 2.15])
     x, y, z = (float(v) for v in vector[:, 0])
-    tx, ty, tz = (float(v) for v in -rotation @ place)
+    tx, ty, tz = (float(v) for v in -rotation @ centre)
     return View(lens, (x, y, z), (tx, ty, tz))
 
 
 def tag_places(table: Table) -> dict[int, Array]:
-    """Return the middles (2,) of the tags about a table, m, by their numbers."""
+    """Return the centres (2,) of the tags around a table, m, by their numbers."""
     x, y = table.size / 2
     along = np.linspace(-0.86 * x, 0.86 * x, 4)
     sides = [(float(a), s * (float(y) + TAGS_BESIDE)) for s in (1, -1) for a in along]
-    return {k: np.array(place) for k, place in enumerate(sides)}
+    return {k: np.array(centre) for k, centre in enumerate(sides)}
 
 
 @dataclass
 class Seen:
-    """What is before the camera in the middle of an exposure, table frame."""
+    """Moving bodies in the middle of an exposure, table frame."""
 
     puck: Array | None
-    """(2,) m; None if it is not on the table"""
+    """(2,) position of the puck, m; None if it is not on the table"""
     puck_velocity: Array
-    """(2,) m/s"""
+    """(2,) velocity of the puck, m/s"""
     paddle: Array
-    """(2,) m"""
+    """(2,) position of the paddle, m"""
     paddle_velocity: Array
-    """(2,) m/s"""
+    """(2,) velocity of the paddle, m/s"""
 
 
 class TableCamera(LabCamera[Seen]):
-    """Camera over a simulated table.
+    """Camera above a simulated table.
 
     Args:
-        table: that it sees.
-        view: where it is.
-        base: (2,) place of the arm's base, table frame, m.
-        exposure: s.
-        seed: of its noise.
+        table: Table in the view.
+        view: View of the camera.
+        base: (2,) position of the arm's base, table frame, m.
+        exposure: Exposure time, s.
+        seed: Seed of the image noise.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class TableCamera(LabCamera[Seen]):
     ) -> None:
         self._table, self._base = table, np.asarray(base)
         self.left: Array | None = None
-        """Place (2,) of a second puck that lies on the table, m; None for none."""
+        """(2,) position of a second puck at rest, m; None without one."""
         super().__init__(view, exposure, seed)
 
     def _draw_still(self, scene: Array, view: View) -> None:
@@ -97,8 +97,8 @@ class TableCamera(LabCamera[Seen]):
         y = float(self._table.size[1]) / 2
         middle = np.array([(-0.003, -y), (0.003, -y), (0.003, y), (-0.003, y)])
         fill(scene, view, middle, 0.0, LINES)
-        for number, place in tag_places(self._table).items():
-            paste_tag(scene, view, number, place)
+        for number, centre in tag_places(self._table).items():
+            paste_tag(scene, view, number, centre)
 
     def _draw(
         self, part: Array, seen: Seen, later: float, corner: tuple[int, int]
@@ -135,11 +135,16 @@ class TableCamera(LabCamera[Seen]):
 
 
 def _link(paddle: Array, base: Array) -> Array:
-    """Return the corners (4, 2) of the arm's last link, from the paddle to the base."""
-    way = base - paddle
-    way = way / np.linalg.norm(way)
-    aside = np.array([-way[1], way[0]])
-    far = paddle + 0.45 * way
-    near = paddle - 0.02 * way
+    """Return the corners (4, 2) of the arm's last link, table frame, m.
+
+    Args:
+        paddle: (2,) position of the paddle, m.
+        base: (2,) position of the arm's base, m.
+    """
+    along = base - paddle
+    along = along / np.linalg.norm(along)
+    aside = np.array([-along[1], along[0]])
+    far = paddle + 0.45 * along
+    near = paddle - 0.02 * along
     wide, narrow = 0.06 * aside, 0.035 * aside
     return np.stack([near + narrow, near - narrow, far - wide, far + wide])

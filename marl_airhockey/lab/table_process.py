@@ -1,4 +1,4 @@
-"""Process of the lab's table: its physics and its camera, in real time."""
+"""Process of the lab's table: physics and camera, in real time."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from marl_airhockey.lab.table_camera import Seen, TableCamera, lab_view
 from marl_airhockey.lab.world import RATE, LabWorld
 
 LATE = 0.25
-"""Time by which the loop may lag before it gives up what it missed, s"""
+"""Largest lag of the loop, s; after a larger one, missed steps are skipped"""
 MOVED = 0.02
-"""Way of a camera that was knocked against, m"""
+"""Displacement of a camera under the fault moved_camera, m"""
 DELAY = 0.2
-"""Time by which delayed frames come later, s"""
-LEFT = np.array([0.55, -0.25])
-"""Place of a second puck that was left on the table, m"""
+"""Additional latency under the fault delayed_frames, s"""
+SECOND_PUCK = np.array([0.55, -0.25])
+"""(2,) position of the second puck under the fault second_puck, table frame, m"""
 
 
 class TableLoop:
-    """Loop of the table: a step of the world, and a picture when it is due.
+    """Loop of the table: steps of the world, and a frame when it is due.
 
     Args:
-        setup: of the lab.
-        seed: of what this table is like.
-        frame_rate: pictures a second.
-        block: where the arm tells of its paddle.
-        server: of the pictures.
+        setup: Setup of the lab.
+        seed: Seed of the table's physical parameters and of the image noise.
+        frame_rate: Frame rate of the camera, 1/s.
+        block: Memory in which the arm reports its paddle, see `PublishedTable`.
+        server: Server of the frames.
     """
 
     def __init__(
@@ -56,14 +56,14 @@ class TableLoop:
         self._every = max(round(RATE / frame_rate), 1)
         self._steps, self._frames, self._frozen = 0, 0, False
         self._now = time.monotonic()
-        self._arm_then = block.read()[1:].tolist()
+        self._paddle_state = block.read()[1:].tolist()
         self.faults: dict[str, Callable[[bool], None]] = {
             "frozen_camera": self._freeze,
             "dark_camera": self._darken,
-            "moved_camera": self._knock,
+            "moved_camera": self._move_camera,
             "delayed_frames": self._delay,
-            "second_puck": self._leave,
-            "lost_puck": self._lose,
+            "second_puck": self._add_puck,
+            "lost_puck": self._remove_puck,
         }
 
     def _freeze(self, on: bool) -> None:
@@ -75,25 +75,29 @@ class TableLoop:
     def _delay(self, on: bool) -> None:
         self._server.latency = self._setup.latency + (DELAY if on else 0.0)
 
-    def _leave(self, on: bool) -> None:
-        self._camera.left = LEFT if on else None
+    def _add_puck(self, on: bool) -> None:
+        self._camera.left = SECOND_PUCK if on else None
 
-    def _knock(self, on: bool) -> None:
+    def _move_camera(self, on: bool) -> None:
         x, y, z = self._view.translation
         moved = replace(self._view, translation=(x + MOVED, y, z))
         self._camera.move(moved if on else self._view)
 
-    def _lose(self, on: bool) -> None:
+    def _remove_puck(self, on: bool) -> None:
         self.world.present = not on
 
     def step(self, now: float) -> None:
-        """Go on to a moment, s."""
+        """Advance the world by one step.
+
+        Args:
+            now: Time of the new state, monotonic clock, s.
+        """
         stamp, x, y, z, vx, vy = self._block.read()
         velocity = np.array([vx, vy])
         ahead = min(max(now - stamp, 0.0), 0.02)
         paddle = np.array([x, y]) + ahead * velocity
         self.world.step(paddle, velocity, z)
-        self._now, self._arm_then = now, [*paddle.tolist(), z, vx, vy]
+        self._now, self._paddle_state = now, [*paddle.tolist(), z, vx, vy]
         self._steps += 1
         if self._steps % self._every == 0 and not self._frozen:
             self._server.send(self._photograph(now, paddle, velocity))
@@ -108,12 +112,12 @@ class TableLoop:
         return Frame(image, now, self._frames)
 
     def obey(self, order: dict[str, Any]) -> dict[str, Any]:
-        """Do what the lab's operator asks for; return what there is to tell."""
+        """Carry out an order of the lab's operator; return the true state."""
         world = self.world
         what = order["do"]
         if what == "place":
-            place, velocity = np.array(order["puck"]), np.array(order["velocity"])
-            world.put(place, velocity, held=True)
+            position, velocity = np.array(order["puck"]), np.array(order["velocity"])
+            world.put(position, velocity, held=True)
         elif what == "release":
             world.release()
         elif what == "board":
@@ -125,7 +129,7 @@ class TableLoop:
             "time": self._now,
             "touches": [since + t for t in world.touches],
             "banks": [(since + t, s) for t, s in world.banks],
-            "paddle": self._arm_then,
+            "paddle": self._paddle_state,
             "puck": world.puck.tolist(),
             "velocity": world.puck_velocity.tolist(),
             "laws": {name: float(value[0]) for name, value in world.laws.items()},
@@ -135,7 +139,7 @@ class TableLoop:
 def run_table(
     setup: LabSetup, seed: int, frame_rate: float, memory: Any, pipe: Connection
 ) -> None:
-    """Play the table until the other end of the pipe is closed."""
+    """Run the table until the other end of the pipe is closed."""
     server = FrameServer(setup.latency)
     block = Block(np.frombuffer(memory))
     loop = TableLoop(setup, seed, frame_rate, block, server)

@@ -1,4 +1,4 @@
-"""World of the lab: the simulated table itself, which no device can look into."""
+"""World of the lab: the true simulated table, hidden from all devices."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ NEAR = 0.004
 
 
 class LabWorld:
-    """World with one puck and a paddle that the arm carries.
+    """World with one puck and a paddle that the arm moves.
 
     Args:
-        setup: of the lab.
-        seed: of what this table is like: its laws are drawn from what tables have been
-            measured to be like.
+        setup: Setup of the lab.
+        seed: Seed of the table's physical parameters, which are sampled from the ranges
+            that were measured on real tables.
     """
 
     def __init__(self, setup: LabSetup, seed: int = 0) -> None:
@@ -39,20 +39,20 @@ class LabWorld:
         rows = np.zeros(1, np.int64)
         streams.renew(rows, np.array([seed]), np.array([1]))
         self.laws = physics.draw(streams.of("physics"))
-        """Parameters of this table by name, (1,) each."""
+        """Physical parameters of this table by name, (1,) each."""
         self._backend.set_physics(self.laws, rows)
         state = self.scene.still_state(1)
         state.paddle[0, 0] = setup.home
         self._paddle = np.array(setup.home)
         self._state = self._begin(state)
         self.held = True
-        """True while somebody holds the puck."""
+        """True while the operator holds the puck."""
         self.present = False
         """True if the puck is on the table."""
         self.touches: list[float] = []
-        """Times of this world at which the paddle met the puck since it was put."""
+        """Times of this world of the paddle's contacts since `put`, s."""
         self.banks: list[tuple[float, int]] = []
-        """Times at which the puck met a side since then, and that side."""
+        """Times of the wall bounces since `put`, s, and their sides."""
 
     def _begin(self, state: State) -> State:
         self._backend.reset(state, np.zeros(1, np.int64))
@@ -65,16 +65,22 @@ class LabWorld:
 
     @property
     def puck(self) -> Array:
-        """(2,) m."""
+        """(2,) position of the puck, table frame, m."""
         return np.asarray(self._state.puck[0, 0].copy())
 
     @property
     def puck_velocity(self) -> Array:
-        """(2,) m/s."""
+        """(2,) velocity of the puck, table frame, m/s."""
         return np.asarray(self._state.puck_velocity[0, 0].copy())
 
     def put(self, place: Array, velocity: Array, held: bool) -> None:
-        """Put the puck somewhere, (2,) m, with a velocity once it is let go, m/s."""
+        """Put the puck on the table.
+
+        Args:
+            place: (2,) position, table frame, m.
+            velocity: (2,) velocity after the release, table frame, m/s.
+            held: Whether the puck is held until `release`.
+        """
         position, moving = self._state.position.copy(), self._state.velocity.copy()
         puck = self.scene.bodies.puck
         position[0, puck], moving[0, puck] = place, velocity
@@ -86,7 +92,7 @@ class LabWorld:
         self.touches, self.banks = [], []
 
     def release(self) -> None:
-        """Let the puck go."""
+        """Release the puck."""
         self.held = False
 
     def remove(self) -> None:
@@ -94,12 +100,12 @@ class LabWorld:
         self.present = False
 
     def step(self, paddle: Array, velocity: Array, height: float) -> None:
-        """Go on by 1 / `RATE` s.
+        """Advance by 1 / `RATE` s.
 
         Args:
-            paddle: (2,) where the arm holds it then, m.
-            velocity: (2,) m/s.
-            height: of its foot above the table, m.
+            paddle: (2,) position of the paddle at the end of the step, m.
+            velocity: (2,) velocity of the paddle, m/s.
+            height: Height of the paddle's foot above the table, m.
         """
         command = Command.still(self.scene, 1)
         command.prescribed[0, 0] = *paddle, *velocity

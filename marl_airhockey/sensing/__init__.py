@@ -1,1 +1,1 @@
-"""Sensing: what is known of a state, with its delay, noise, occlusion and history."""
+"""Sensing: sensed states with delay, noise and occlusion, and their history."""

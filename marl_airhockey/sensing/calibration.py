@@ -10,14 +10,14 @@ from marl_airhockey.types import Array, Rows
 WAVES = 4
 """Number of plane waves in a map, for each component."""
 LENGTHS = (0.7, 1.4)
-"""Range of their wavelengths, in widths of the table; a map that was measured on a real
-table had a period of about one."""
+"""Range of the wavelengths, in widths of the table; a map that was measured on a real
+table had a period of about one width."""
 
 
 class CalibrationMap:
     """Map of the calibration error in B worlds: a sum of plane waves of any direction.
 
-    Its standard deviation over positions and episodes is the ``sd`` of `sample`.
+    The standard deviation over positions and episodes is the ``sd`` of `sample`.
 
     Args:
         worlds: Number of worlds, B.
@@ -53,7 +53,7 @@ class CalibrationMap:
         self._height[worlds] = sd * np.sqrt(2.0 / WAVES)
 
     def shifted(self, position: Array, rows: Rows) -> Array:
-        """Return positions (W, n, 2) in some worlds with their error added, m."""
+        """Return positions (W, n, 2) in some worlds with the error added, m."""
         x, y = position[:, :, None, None, 0], position[:, :, None, None, 1]
         waves = self._x[rows][:, None] * x + self._y[rows][:, None] * y
         shift = np.cos(waves + self._phase[rows][:, None]).sum(2)

@@ -1,4 +1,4 @@
-"""Delay lines: values of B worlds as they were some time ago."""
+"""Delay lines: values of B worlds from some time ago."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Delay:
     def _pushed(
         self, value: Array, delay: Array, rows: Rows
     ) -> tuple[Array, Array, Array]:
-        """Append the newest value; return the two values around a moment of the past.
+        """Append the newest value; return the two values around a time in the past.
 
         Returns:
-            The values (W, ...) before and after that moment, and the share of the
-            step between them that lies before it, (W, 1, ...).
+            The values (W, ...) before and after that time, and the share of the step
+            between them that lies before it, (W, 1, ...).
         """
         past = np.concatenate([self._past[rows][:, 1:], value[:, None]], axis=1)
         self._past[rows] = past
@@ -53,11 +53,11 @@ class Delay:
 
 
 class TrajectoryDelay(Delay):
-    """Delay line of trajectories that are straight but for one kink within a step.
+    """Delay line of trajectories that are straight except for one kink within a step.
 
     The kink is where the straight lines before and after a step meet, as at a wall
-    bounce or a hit. Where they are parallel it is in the middle of the step, which is
-    0.3 mm off the trajectory under an acceleration of 0.94 m/s2 in 50 ms.
+    bounce or a hit. If they are parallel, it is in the middle of the step. The error is
+    then 0.3 mm for an acceleration of 0.94 m/s2 over 50 ms.
 
     Args:
         longest: Largest delay, s.

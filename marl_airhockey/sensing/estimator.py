@@ -1,9 +1,8 @@
-"""Estimator: where pucks are now, and how they move, from what a camera saw.
+"""Estimator: positions and velocities of pucks now, from a camera's delayed frames.
 
-A Kalman filter with the laws of the table in it: a puck is predicted under drag, slope,
-banks and the hits of paddles, whose ways are known, and corrected by every frame. What
-is shown is the prediction for now, so that delay, noise and short occlusions are made
-up for as far as the table is known.
+A Kalman filter with a physics model of the table: drag, slope, wall bounces and hits by
+paddles, whose paths are known. Every frame corrects it. The output is the prediction
+for now, which compensates delay, noise and short occlusions as far as the model holds.
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ from marl_airhockey.types import Array
 STEP = 0.01
 """Longest step of a prediction, s"""
 PAST = 0.4
-"""Time for which the ways of paddles are kept, s"""
+"""Time for which the paths of paddles are kept, s"""
 DRIFT = 0.5
-"""Acceleration that the laws do not tell, m/s2: slopes, tilts as they differ, and a map
-that changes with place. Like the next two it was chosen for the least errors in juggle
-under the profile ur5e."""
-BANK, HIT = 0.08, 0.10
-"""What a bank and a hit leave unknown, as shares of the closing speed"""
+"""Noise of the acceleration, m/s2, for errors of the model: unknown slopes and a
+calibration error that depends on the position. Like the next two, it has the least
+errors in juggle under the profile ur5e."""
+BOUNCE, HIT = 0.08, 0.10
+"""Noise of the velocity after a wall bounce and a hit, as share of the closing speed"""
 FIRST = 0.02
-"""Unknown part of a first velocity, m/s"""
+"""Standard deviation of the initial velocity, m/s"""
 ABRUPT = 2.5
-"""Change of a velocity beyond which one frame alone is not believed, m/s"""
+"""Change of a velocity above which a second frame must confirm it, m/s"""
 STRANGE = 9.0
-"""Squared error, in variances of the prediction, above which something unseen must have
-changed the velocity"""
+"""Squared error, in variances of the prediction, above which an unmodelled event must
+have changed the velocity"""
 
-LAWS = (
+PARAMETERS = (
     *("puck_damping", "puck_drag", "wall_restitution", "wall_restitution_slope"),
     *("wall_friction", "paddle_restitution", "paddle_friction"),
 )
@@ -45,32 +44,32 @@ LAWS = (
 
 
 class Surroundings(NamedTuple):
-    """What predictions know of a table."""
+    """Model of a table for predictions."""
 
-    laws: Array
-    """(9,) pulls along x and y, m/s2, and `LAWS`: the middle of each range"""
+    parameters: Array
+    """(9,) slope accelerations along x and y, m/s2, then `PARAMETERS`: range centres"""
     normals: Array
-    """(sides, 2) inward"""
+    """(sides, 2) inward unit normals"""
     offsets: Array
     """(sides,) distances from the origin, m"""
     radius: float
     """Radius of a puck, m"""
     near: float
-    """Distance of the centres of a puck and a paddle that touch, m"""
+    """Distance between the centres of a puck and a paddle in contact, m"""
     noise: float
-    """Variance of a seen position, m2"""
+    """Variance of a sensed position, m2"""
     control_dt: float
-    """s"""
+    """Time of a control step, s"""
 
 
 class Estimator:
     """Estimator of the pucks of B worlds.
 
     Args:
-        scene: table and bodies.
-        worlds: B.
-        physics: tells the middle of each parameter's range, and the noise.
-        control_dt: s.
+        scene: Table and bodies.
+        worlds: Number of worlds, B.
+        physics: Ranges of the parameters, whose centres are used.
+        control_dt: Time of a control step, s.
     """
 
     def __init__(
@@ -79,10 +78,12 @@ class Estimator:
         middle = {name: sum(pair) / 2 for name, pair in physics.ranges.items()}
         tilts = np.radians([middle["tilt"], middle["cross_tilt"]])
         table, bodies = scene.table, scene.bodies
-        # Of the map, only its change within some frames disturbs a velocity.
+        # Only changes of the calibration error within some frames disturb a velocity.
         noise = middle["position_noise"] ** 2 + (middle["calibration_error"] / 4) ** 2
         self._known = Surroundings(
-            np.array([*(-GRAVITY * np.sin(tilts)), *(middle[name] for name in LAWS)]),
+            np.array(
+                [*(-GRAVITY * np.sin(tilts)), *(middle[name] for name in PARAMETERS)]
+            ),
             table.normals,
             table.offsets,
             table.puck_radius,
@@ -92,18 +93,21 @@ class Estimator:
         )
         shape = worlds, bodies.pucks
         self._mean, self._spread = np.zeros((*shape, 5)), np.zeros((*shape, 3))
-        """At the last frame: x, y, vx, vy, speed of the edge; variances of a place and
-        of a velocity along either axis, between them their covariance"""
+        """At the last frame: x, y, vx, vy, speed of the edge; variance of the position,
+        covariance and variance of the velocity, the same along either axis"""
         self._taken, self._doubted = np.zeros(shape), np.zeros(shape, np.bool_)
         kept = max(round(PAST / control_dt), 2)
         self._paddles = np.zeros((worlds, kept, bodies.paddles, 2))
         self.now = np.zeros((*shape, 5))
-        """(B, pucks, 5) x, y, m, vx, vy, speed of the edge, m/s, estimated for now"""
+        """(B, pucks, 5) estimates for now: x, y, m, vx, vy, speed of the edge, m/s"""
 
     def reset(
         self, worlds: Array, seen: Array, velocity: Array, taken: Array, paddles: Array
     ) -> None:
-        """Begin with pucks (W, pucks, 2) seen at ``taken`` (W, pucks), and paddles."""
+        """Reset worlds (W,) to pucks with some velocity, and paddles at rest.
+
+        The pucks were ``seen`` (W, pucks, 2), m, at the times ``taken`` (W, pucks), s.
+        """
         self._mean[worlds] = 0.0
         self._mean[worlds, :, :2], self._mean[worlds, :, 2:4] = seen, velocity
         self._spread[worlds] = self._known.noise, 0.0, FIRST**2
@@ -122,12 +126,12 @@ class Estimator:
         """Correct the estimates of some worlds by a frame; predict them for now.
 
         Args:
-            worlds: (W,) indices.
-            seen: (W, pucks, 2) places in the frame, m.
-            taken: (W,) time of the frame, s.
-            fresh: (W, pucks) bool, False where a puck is not seen in a new frame.
-            paddles: (W, S, 2) places now, m.
-            now: (W,) s.
+            worlds: Indices (W,) of the worlds.
+            seen: Positions (W, pucks, 2) in the frame, m.
+            taken: Times (W,) of the frame, s.
+            fresh: (W, pucks) bool, True for pucks that are visible in a new frame.
+            paddles: Positions (W, S, 2) of the paddles now, m.
+            now: Times (W,) now, s.
         """
         past = self._paddles[worlds]
         past[:, :-1], past[:, -1] = past[:, 1:].copy(), paddles
@@ -143,9 +147,9 @@ class Estimator:
         paddles: Array,
         now: Array,
     ) -> None:
-        """Do what `update` does, with the ways (W, n, S, 2) of paddles given.
+        """Do what `update` does, with the paths (W, n, S, 2) of paddles given.
 
-        Their places are a control step apart, the last is that of now.
+        The positions are a control step apart; the last one is that of now.
         """
         _update(
             *(worlds, seen, taken, fresh, paddles, now, self._known),
@@ -169,7 +173,7 @@ def _update(
     doubted: Array,
     shown: Array,
 ) -> None:
-    """Update all arrays of an `Estimator` from ``mean`` on; see `Estimator.update`."""
+    """Update the arrays of an `Estimator` in place, see `Estimator.update_along`."""
     ahead, wide = np.empty(5), np.empty(3)
     for row in range(len(worlds)):
         w = worlds[row]
@@ -193,13 +197,13 @@ def _update(
 def _correct(
     mean: Array, spread: Array, seen: Array, since: float, doubted: bool, noise: float
 ) -> bool:
-    """Correct a prediction by a seen place; return True if that is not believed."""
+    """Correct a prediction by a sensed position; return True if it is doubtful."""
     dx, dy = seen[0] - mean[0], seen[1] - mean[1]
     off = dx * dx + dy * dy
     if off > (ABRUPT * since) ** 2 and not doubted:
         return True
     if off > 2.0 * STRANGE * (spread[0] + noise):
-        # As if the velocity had changed some time after the last frame.
+        # Assume a change of the velocity some time after the last frame.
         change = off / (since * since)
         spread[2] += change
         spread[1] += change * since
@@ -225,22 +229,22 @@ def _predict(
     now: float,
     known: Surroundings,
 ) -> None:
-    """Move an estimate on by some seconds, in place.
+    """Predict an estimate over some seconds, in place.
 
     Args:
         mean: (5,) x, y, vx, vy, speed of the edge.
         spread: (3,) variances and covariance.
-        begin: time of the estimate, s.
-        seconds: s.
-        paddles: (n, S, 2) places at control steps, the last now.
-        now: s.
-        known: of the table.
+        begin: Time of the estimate, s.
+        seconds: Time of the prediction, s.
+        paddles: Positions (n, S, 2) at control steps, the last now, m.
+        now: Time now, s.
+        known: Model of the table.
     """
-    laws, steps = known.laws, int(np.ceil(seconds / STEP))
+    values, steps = known.parameters, int(np.ceil(seconds / STEP))
     h = seconds / max(steps, 1)
     for k in range(steps):
         dx, dy, mean[2], mean[3] = fly(
-            mean[2], mean[3], h, laws[0], laws[1], laws[2], laws[3]
+            mean[2], mean[3], h, values[0], values[1], values[2], values[3]
         )
         mean[0] += dx
         mean[1] += dy
@@ -252,12 +256,12 @@ def _predict(
             beyond = known.offsets[side] + nx * mean[0] + ny * mean[1] - known.radius
             closing = -(nx * mean[2] + ny * mean[3])
             if beyond < 0.0 and closing > 0.0:
-                e = wall_restitution(closing, laws[4], laws[5])
-                bounce(mean, nx, ny, closing, 0.0, e, laws[6])
-                # What was flown beyond the wall comes back at another speed.
+                e = wall_restitution(closing, values[4], values[5])
+                bounce(mean, nx, ny, closing, 0.0, e, values[6])
+                # The distance beyond the wall is covered again at the new speed.
                 mean[0] -= (1.0 + e) * beyond * nx
                 mean[1] -= (1.0 + e) * beyond * ny
-                spread[2] += (BANK * closing) ** 2
+                spread[2] += (BOUNCE * closing) ** 2
         back = (now - begin - (k + 1) * h) / known.control_dt
         _meet(mean, spread, paddles, back, known)
 
@@ -266,7 +270,7 @@ def _predict(
 def _meet(
     mean: Array, spread: Array, paddles: Array, back: float, known: Surroundings
 ) -> None:
-    """Let a puck meet the paddles as they were ``back`` control steps ago."""
+    """Apply contacts of a puck with the paddles of ``back`` control steps ago."""
     last = len(paddles) - 1
     new = max(last - int(back), 1)
     share = min(max(last - back - (new - 1), 0.0), 1.0)
@@ -281,12 +285,14 @@ def _meet(
         nx, ny = gx / gap, gy / gap
         wx, wy = wx / known.control_dt, wy / known.control_dt
         closing = nx * (wx - mean[2]) + ny * (wy - mean[3])
-        # What was flown into the paddle comes back, too.
+        # The distance into the paddle is covered again, too.
         back_out = known.near - gap
         if closing > 0.0:
             along = nx * wy - ny * wx
-            bounce(mean, nx, ny, closing, along, known.laws[7], known.laws[8])
+            bounce(
+                mean, nx, ny, closing, along, known.parameters[7], known.parameters[8]
+            )
             spread[2] += (HIT * closing) ** 2
-            back_out *= 1.0 + known.laws[7]
+            back_out *= 1.0 + known.parameters[7]
         mean[0] += back_out * nx
         mean[1] += back_out * ny

@@ -9,10 +9,10 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array, Rows
 
 SECONDS = 0.1
-"""Mean length of an occlusion near an arm (s): half of those measured in play were
-shorter than 17 .. 58 ms, one in ten longer than 92 .. 100."""
+"""Mean length of an occlusion near an arm (s). In measured play, half of them were
+shorter than 17 .. 58 ms, one in ten longer than 92 .. 100 ms."""
 NEAR = 0.25
-"""Distance from an arm within which it can hide a puck (m): all measured occlusions
+"""Distance from an arm within which it can hide a puck (m). All measured occlusions
 were within it, or at the far rail."""
 
 
@@ -20,7 +20,7 @@ class Occlusion:
     """Occlusion of the pucks of B worlds.
 
     An arm reaches from the middle of its seat's side to the paddle. Near an arm, a puck
-    is hidden and visible by turns, as a Markov chain of two states; elsewhere it is
+    changes between hidden and visible as a Markov chain of two states. Elsewhere it is
     always visible.
 
     Args:
@@ -40,7 +40,12 @@ class Occlusion:
         self._visible[worlds] = True
 
     def near(self, pucks: Array, paddles: Array) -> Array:
-        """Return (W, pucks) True for pucks (W, pucks, 2) near an arm."""
+        """Return (W, pucks) bool, True for pucks near an arm.
+
+        Args:
+            pucks: Positions (W, pucks, 2), m.
+            paddles: Positions (W, seats, 2), m.
+        """
         along = (paddles - self._bases)[:, None]
         gap = pucks[:, :, None] - self._bases
         share = (gap * along).sum(-1) / np.maximum((along * along).sum(-1), 1e-12)

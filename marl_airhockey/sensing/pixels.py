@@ -29,7 +29,7 @@ def small_picture(
         seat: Index of the seat; its own paddle is the brighter one.
         size: Width and height, pixels.
     """
-    # Here, as everything else in sensing needs no more than numpy and numba.
+    # Imported here, as the rest of the package needs only numpy and numba.
     import cv2
 
     image = np.zeros((size, size), np.uint8)

@@ -1,4 +1,4 @@
-"""Reaction time: seats observe what is sensed some control steps later."""
+"""Reaction time: seats observe sensed states some control steps late."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 from marl_airhockey.types import Array
 
 Parts = Mapping[str, Mapping[str, Any]]
-"""Arrays (B, ...) by part and name, such as the fields of a state; values that are no
+"""Arrays (B, ...) by part and name, such as the fields of a state; values that are not
 arrays are constant and are not delayed."""
 
 
 class ReactionDelay:
-    """Delay of what is sensed in B worlds, by whole control steps.
+    """Delay of sensed states in B worlds, by whole control steps.
 
-    The past of an episode that begins is its beginning.
+    The past of a new episode is filled with its first values.
 
     Args:
         steps: Delay in control steps.
@@ -35,19 +35,19 @@ class ReactionDelay:
             self._ring(key, now)[:, worlds] = now[worlds]
 
     def push(self, parts: Parts) -> None:
-        """Append what is sensed after a step."""
+        """Append the sensed values after a step."""
         self._newest = (self._newest + 1) % (self.steps + 1)
         for key, now in _arrays(parts):
             self._ring(key, now)[self._newest] = now
 
     def _ring(self, key: tuple[str, str], now: Array) -> Array:
-        """Return the past of an array, which begins with the first call."""
+        """Return the past of an array; the first call creates it."""
         if key not in self._past:
             self._past[key] = np.repeat(now[None], self.steps + 1, axis=0)
         return self._past[key]
 
     def delayed(self, part: str) -> dict[str, Any]:
-        """Return the arrays of a part as seats observe them now; do not change them."""
+        """Return the arrays of a part that seats observe now; do not change them."""
         oldest = (self._newest + 1) % (self.steps + 1)
         past = self._past.items()
         return {name: ring[oldest] for (of, name), ring in past if of == part}

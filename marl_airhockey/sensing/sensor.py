@@ -1,4 +1,4 @@
-"""Sensor: what is known of the states of B worlds, with its history."""
+"""Sensor: the sensed states of B worlds and their history."""
 
 from __future__ import annotations
 
@@ -17,16 +17,20 @@ from marl_airhockey.types import ALL, Array, Rows
 
 
 class Needs(NamedTuple):
-    """What some forms of observations need beyond the sensed state."""
+    """Requirements of some forms of observations beyond the sensed state."""
 
     history: bool
     """The last sensed positions and requested actions."""
     estimate: bool
-    """Pucks as a filter estimates them for now."""
+    """Estimates of the pucks for now, by a filter."""
 
     @staticmethod
     def of(forms: Iterable[str]) -> Needs:
-        """Return what forms of observations need, see `observable.OBSERVE`."""
+        """Return the requirements of forms of observations, see `observable.OBSERVE`.
+
+        Args:
+            forms: Names of the forms.
+        """
         forms = set(forms)
         return Needs(bool(forms - {"velocity"}), "estimate" in forms)
 
@@ -39,7 +43,7 @@ class Sensor:
         num_worlds: Number of worlds, B.
         physics: Ranges of the parameters of sensing.
         control_dt: Time of a step, s.
-        needs: What observations need.
+        needs: Requirements of the observations.
         sight: Newest measurement of a backend that senses itself, see
             `Backend.sight`; None for a simulated camera.
     """
@@ -55,7 +59,7 @@ class Sensor:
     ) -> None:
         self.control_dt, self._sight, self._keeps = control_dt, sight, needs.history
         self.camera: SimulatedCamera | None = None
-        """Simulated camera; None where states are sensed exactly as they are."""
+        """Simulated camera; None if the states themselves are observed."""
         if sight is None and physics.any_of(*SENSED):
             simulated = scene, num_worlds, physics, control_dt, needs.estimate
             self.camera = SimulatedCamera(*simulated)
@@ -69,7 +73,7 @@ class Sensor:
 
     @property
     def ideal(self) -> bool:
-        """True if sensed states are the states as they are."""
+        """True if sensed states are equal to the states."""
         return self.camera is None
 
     def past(self) -> dict[str, Array]:
@@ -77,7 +81,7 @@ class Sensor:
         return {"history": self.history, "requested": self.requested}
 
     def estimated(self, sensed: State) -> State:
-        """Return a sensed state with the pucks as they are estimated to be now."""
+        """Return a sensed state with the estimates of the pucks for now."""
         return sensed if self.camera is None else self.camera.estimated(sensed)
 
     def note(self, actions: Array) -> None:

@@ -1,4 +1,4 @@
-"""Simulated camera: how a camera sees pucks and blocks, with its errors."""
+"""Simulated camera: sensed positions of pucks and blocks, with a camera's errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SENSED = (
 )
 """Names of the physical parameters of sensing."""
 SAME_FRAME = 1e-4
-"""Two frames that are no more than this apart are the same frame (s)."""
+"""Largest time between two readings of the same frame (s)."""
 
 
 class SimulatedCamera:
@@ -41,7 +41,7 @@ class SimulatedCamera:
         num_worlds: Number of worlds, B.
         physics: Ranges of the parameters of sensing.
         control_dt: Time of a step, s.
-        estimates: Whether pucks are estimated by a filter, too.
+        estimates: Whether a filter estimates the pucks as well.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class SimulatedCamera:
     ) -> None:
         self.control_dt = control_dt
         self.tracked = slice(scene.bodies.paddles, scene.bodies.movers)
-        """Bodies that it sees: pucks and blocks."""
+        """Indices of the bodies that it sees: pucks and blocks."""
         self.pucks, self._puck_radius = scene.bodies.pucks, scene.table.puck_radius
         count = self.tracked.stop - self.tracked.start
         shape = (num_worlds, count, 2)
@@ -77,7 +77,7 @@ class SimulatedCamera:
     def begin(
         self, worlds: Array, values: Mapping[str, Array], streams: StreamSet
     ) -> None:
-        """Sample what is fixed for an episode in some worlds; `reset` comes after it.
+        """Sample what is fixed for an episode in some worlds; call `reset` after it.
 
         Args:
             worlds: Indices (W,) of the worlds.
@@ -133,7 +133,7 @@ class SimulatedCamera:
         position, velocity = state.position.copy(), state.velocity.copy()
         position[:, self.tracked] = self._position
         velocity[:, self.tracked] = self._velocity
-        # A camera sees the middle of a puck, not how it rotates.
+        # A camera sees the centre of a puck, not its spin.
         spin = state.spin.copy()
         spin[:, self.tracked] = 0.0
         visible = state.visible & self._visible
@@ -143,9 +143,13 @@ class SimulatedCamera:
         return sensed, state.time[:, None] - self._taken[:, : self.pucks]
 
     def estimated(self, sensed: State) -> State:
-        """Return a sensed state with the pucks as they are estimated to be now."""
+        """Return a sensed state with the estimates of the pucks for now.
+
+        Raises:
+            RuntimeError: It was made without ``estimates``.
+        """
         if self._estimator is None:
-            raise RuntimeError("pucks are not estimated here; say so when it is built")
+            raise RuntimeError("pucks are not estimated; make it with estimates=True")
         found, puck = self._estimator.now, sensed.bodies.puck
         position, velocity = sensed.position.copy(), sensed.velocity.copy()
         spin = sensed.spin.copy()

@@ -96,10 +96,13 @@ class Versus(Scenario):
         held = rewards.held(self.scene, t)
         foul = held >= self.possession - 1e-9
         lying = rewards.lying(t, held)
-        toward = 1.0 * (far | foul[..., 0, :]) - 1.0 * (home | foul[..., -1, :])
+        scored = 1.0 * far - 1.0 * home
+        fouled = 1.0 * foul[..., 0, :] - 1.0 * foul[..., -1, :]
+        # A goal counts before a foul that is called in the same step.
+        toward = np.where(scored != 0.0, scored, fouled)
         again = (toward == 0.0) & ((lying >= 1.0 - 1e-9) | t.after.lifted)
-        # Between two paddles on the middle line both clocks run at once.
-        again |= foul.all(-2)
+        # Between two paddles on the middle line both clocks run at the same time.
+        again |= foul.all(-2) & (scored == 0.0)
         nearer = np.where(t.after.puck[..., 0] < 0.0, -1.0, 1.0)
         serve = np.where(again, nearer, toward)
         stopped = rewards.saves(self.scene, t, t.memory["toucher"]).sum(-2)

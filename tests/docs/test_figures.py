@@ -104,6 +104,18 @@ def test_ladders_have_the_ratings_of_their_files(game):
         assert float(cells[column]) == pytest.approx(float(known["elo"]), abs=0.6)
 
 
+def test_blind_controllers_are_those_of_their_rows():
+    rows = {(row["task"], row["profile"]): row for row in rows_of("blind.csv")}
+    shown = table("docs/tasks.md", "blind, ideal")
+    assert len(shown) == 5
+    for row in shown:
+        for profile in ("ideal", "ur5e"):
+            found = rows[row["task"], profile]
+            expected = f"{found['success']} ({found['low']} .. {found['high']})"
+            assert row[f"blind, {profile}"] == expected
+        assert row["first shot"] == rows[row["task"], "ideal"]["first_shot"]
+
+
 def pairs_of(cell):
     """Numbers of a cell "median / worst"; none of an empty one."""
     return [float(x) for x in cell.split("/") if x.strip()]

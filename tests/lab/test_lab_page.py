@@ -63,7 +63,7 @@ def test_an_episode_begins_stops_and_goes_on_by_word(lab, match, fault):
     assert match.reason == "robot: protective stop"
     match.start()
     wait_for(match, "pause")
-    assert "May it go on?" in match.reason
+    assert "May it continue?" in match.reason
     time.sleep(5.2)
     match.start()
     wait_for(match, "play")

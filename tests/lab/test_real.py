@@ -117,7 +117,7 @@ def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("moved_camera", "calibrate anew"),
+        ("moved_camera", "calibrate again"),
         ("dark_camera", "are the lights on"),
         ("second_puck", "2 things have the puck's colour"),
     ],

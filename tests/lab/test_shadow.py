@@ -117,9 +117,9 @@ def test_copies_have_cameras_of_their_own(lab, hand):
 
 @pytest.mark.slow
 def test_another_rig_and_a_moved_camera_are_named(lab, hand, rig, tmp_path):
-    with pytest.raises(ValueError, match="the rig of a table, and that of a hand"):
+    with pytest.raises(ValueError, match="the rig of a table, expected that of a hand"):
         ah.make_agent(f"shadow:rig={rig}")
-    with pytest.raises(ValueError, match="the rig of a hand, and that of a table"):
+    with pytest.raises(ValueError, match="the rig of a hand, expected that of a table"):
         Rig.load(hand)
     with pytest.raises(ValueError, match="calibrate --hand"):
         ah.make_agent(f"shadow:rig={tmp_path / 'none.json'}")

@@ -18,7 +18,7 @@ def begin(page):
     until = time.monotonic() + 40
     while (state := state_of(page))["phase"] != "play":
         assert time.monotonic() < until, state["reason"]
-        if "May it go on?" in state["reason"]:
+        if "May it continue?" in state["reason"]:
             page.wait_for_timeout(5600)
         if state["phase"] in ("pause", "done"):
             page.locator("#go").click()

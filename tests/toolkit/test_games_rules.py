@@ -53,6 +53,20 @@ def test_holding_the_puck_in_a_duel_is_a_foul_and_a_dead_puck_is_served(backend)
     np.testing.assert_allclose(robots.state.puck[:, 0], 0.0)
 
 
+@pytest.mark.parametrize("end", [-1.0, 1.0])
+def test_a_goal_counts_before_a_foul_of_the_same_step(end, backend):
+    world = ah.make_world("duel", 2, backend=backend)
+    world.reset(0)
+    seat = 0 if end < 0 else 1
+    held = np.zeros((2, 2, 1))
+    held[:, seat] = 4.96
+    place_puck(world, 0.93 * end, 0.0, 2.0 * end, held=held)
+    idle(world, 0.05)
+    assert world.memory["goals"][0, 1 - seat] == 1.0
+    assert (world.state.puck_velocity[:, 0, 0] * end > 0.45).all()
+    assert (np.abs(world.state.puck[:, 0, 0]) < 0.1).all()
+
+
 def test_a_duel_ends_at_seven_goals_and_the_better_has_won(backend):
     world = ah.make_world("duel", 2, backend=backend, options={"goals_to_win": 2})
     world.autoreset = False

@@ -1,4 +1,4 @@
-"""Real backend: a table with a camera over it and an arm at its home side."""
+"""Real backend: a table with a camera above it and an arm at its home side."""
 
 from marl_airhockey.backends.real.backend import RealBackend
 

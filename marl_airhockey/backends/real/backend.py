@@ -1,4 +1,4 @@
-"""Real backend: camera and robot make the state; steps take as long as they last."""
+"""Real backend: the state comes from camera and robot, steps run in real time."""
 
 from __future__ import annotations
 
@@ -31,28 +31,28 @@ from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
 PROFILE = "ur5e"
-"""Profile of its robot"""
+"""Profile of the table's robot"""
 FIRST_FRAME = 10.0
 """Longest time from opening a camera to its first frame, s"""
 BLIND = 0.3
-"""Time without a picture after which an episode ends, s"""
+"""Time without a camera frame after which an episode ends, s"""
 LOST = 2.0
 """Time for which a puck may be unseen, s"""
 FIRST = 3
-"""Number of sightings with which an episode begins"""
+"""Number of sightings from which the first estimate is made"""
 PLACING = 30.0
 """Longest time until a placed puck is seen, s"""
 APART = 0.08
-"""Distance from where it is wanted at which a placed puck is accepted, m"""
+"""Largest accepted distance of a placed puck from its target position, m"""
 
 
 class RealBackend(Backend):
-    """Backend of one real table: a puck that a camera sees, a paddle that an arm moves.
+    """Backend of one real table: a camera sees the puck, an arm moves the paddle.
 
-    A step sends a command, waits until it is over and returns what is then there: the
-    paddle as the arm tells it, the puck as a filter that knows the table makes it out
-    of all pictures until then. When the robot stops, or no picture or puck is seen for
-    too long, the paddle brakes and `interruption` says why.
+    A step sends a command, waits for the end of the step and returns the state. The arm
+    reports the paddle. A filter with the table's physics estimates the puck from all
+    frames so far. If the robot stops, or no frame or puck arrives for too long, the
+    paddle brakes and `interruption` gives the reason.
     """
 
     instant_contacts: ClassVar[bool] = False
@@ -70,7 +70,7 @@ class RealBackend(Backend):
     ) -> None:
         if num_worlds != 1:
             raise ValueError(
-                f"num_worlds: {num_worlds}; there is one real table, so one world"
+                f"num_worlds: {num_worlds}; expected 1, as there is one real table"
             )
         super().__init__(scene, num_worlds, control_dt, substeps)
         self._devices = ExitStack()
@@ -79,7 +79,7 @@ class RealBackend(Backend):
         self._due = 0.0
         self._began = self._moment = 0.0
         self._overruns = 0
-        self._asked = np.zeros(2)
+        self._commanded = np.zeros(2)
         self._allowed = False
 
     def __getstate__(self) -> dict[str, Any]:
@@ -89,19 +89,19 @@ class RealBackend(Backend):
     def supports(cls, scene: Scene) -> str | None:
         if len(scene.seats) != 1:
             return (
-                "it has one arm, and nobody else may reach into its way; games for "
-                "more seats are played in simulation"
+                "the real table has one arm, and people must stay out of its "
+                "workspace; play games for more seats in simulation"
             )
         if scene.blocks or scene.obstacles:
-            return "there are no blocks on the real table; leave them to a simulation"
+            return "there are no blocks on the real table; use a simulation"
         if scene.pucks > 1:
             return f"there is one puck on the real table, not {scene.pucks}"
         if scene.path:
-            return "it needs to know where pucks are between the camera's pictures"
+            return "the task needs the puck's path between two camera frames"
         if scene.physics.get("tilt") == 0.0:
-            return "the real table is tilted, and this task is for a flat one"
+            return "the real table is tilted, but this task needs a flat one"
         if scene.table not in TABLES.values():
-            return "the table is none of the presets"
+            return "the table is not one of the presets"
         return None
 
     @classmethod
@@ -111,14 +111,14 @@ class RealBackend(Backend):
     def connect(self, rig: str) -> None:
         if not rig:
             raise ValueError(
-                'backend "real": name the file of the devices, rig= or --rig '
-                "(airhockey calibrate writes it), or take the virtual lab, --lab"
+                'backend "real": no rig was given; pass its file, rig= or --rig '
+                "(airhockey calibrate writes it), or use the virtual lab, --lab"
             )
         self.rig = Rig.load(Path(rig))
         table = TABLES[self.rig.table]
         if self.scene.table != table:
             raise ValueError(
-                f"the rig's table is {self.rig.table!r}; play with "
+                f"the scenario's table is not the rig's {self.rig.table!r}; pass "
                 f'options={{"table": "{self.rig.table}"}} or --option '
                 f"table={self.rig.table}"
             )
@@ -148,13 +148,15 @@ class RealBackend(Backend):
     def _check_camera(self) -> None:
         frame = self._camera.next(seconds=FIRST_FRAME)
         if frame is None:
-            raise RuntimeError(f"{self._camera.trouble}: is {self.rig.camera} right?")
+            raise RuntimeError(
+                f"{self._camera.trouble}; check that {self.rig.camera} is the camera"
+            )
         trouble = view_trouble(self.rig.view, [frame.image], self.rig.known_tags)
         if trouble:
             raise RuntimeError(f"camera {self.rig.camera}: {trouble}")
 
     def _check_pucks(self, detector: Detector) -> None:
-        """Refuse a table on which several things have the puck's colour."""
+        """Refuse a table on which several objects have the puck's colour."""
         frame = self._camera.newest
         assert frame is not None
         found = [np.round(seen.place, 2).tolist() for seen in detector.find_all(frame)]
@@ -165,13 +167,18 @@ class RealBackend(Backend):
             )
 
     def _check_arm(self) -> None:
-        """Refuse a reach in which joints come to the limits that the arm tells."""
+        """Refuse a reach that needs joint positions or speeds beyond the arm's limits.
+
+        Raises:
+            RuntimeError: The arm does not answer.
+            ValueError: A joint would exceed its limits.
+        """
         try:
             joints = read_limits(self.rig.robot)
         except OSError as error:
             raise RuntimeError(
-                f"robot at {self.rig.robot}: no arm answers ({error}); is it switched "
-                "on, in remote control, and in this network?"
+                f"robot at {self.rig.robot}: no arm answers ({error}); check that it "
+                "is switched on, in remote control and in this network"
             ) from error
         check_reach(
             *(joints, self.rig.mounting, np.array(self.rig.tool)),
@@ -182,7 +189,7 @@ class RealBackend(Backend):
         self._tracker = Tracker(self.scene, physics)
 
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
-        """Do nothing: the table is what it is."""
+        """Do nothing: the physics of a real table cannot be set."""
 
     @property
     def robot(self) -> Robot:
@@ -213,9 +220,9 @@ class RealBackend(Backend):
             raise RuntimeError(str(error)) from error
         seen: list[Sighting] = []
         if self.scene.pucks:
-            wanted = state.puck[0, 0], state.puck_velocity[0, 0]
-            self.operator.place(*wanted)
-            self._await_puck(wanted[0])
+            target, velocity = state.puck[0, 0], state.puck_velocity[0, 0]
+            self.operator.place(target, velocity)
+            self._await_puck(target)
             self.operator.release()
             seen = self._first_sightings()
         self.robot.enable()
@@ -228,26 +235,26 @@ class RealBackend(Backend):
         return begun
 
     def _ready_robot(self) -> None:
-        """Let a robot that has stopped go on, on the operator's word.
+        """Recover a robot that has stopped, after the operator has allowed it.
 
         Raises:
-            RobotError: it does not.
+            RobotError: The robot does not recover.
         """
         robot = self.robot
         while robot.state is DriverState.FAULT or not robot.is_connected:
             self.operator.allow(robot.fault.label)
             if robot.fault is Fault.EMERGENCY_STOP:
-                # Released at the pendant, by a person, or there is no connection.
+                # A person must release it at the pendant, or `connect` fails.
                 robot.disconnect()
                 robot.connect()
             else:
                 robot.recover()
 
-    def _await_puck(self, wanted: Array) -> None:
-        """Wait until the placed puck is seen near where it is wanted.
+    def _await_puck(self, target: Array) -> None:
+        """Wait until the placed puck is seen near its target position (2,), m.
 
         Raises:
-            RuntimeError: it is not.
+            RuntimeError: The puck is not seen there in time.
         """
         until, far = time.monotonic() + PLACING, float("inf")
         began = time.monotonic()
@@ -255,18 +262,23 @@ class RealBackend(Backend):
             self.robot.send_action(np.zeros(2), 0.0)
             last = self.watcher.last
             if last is not None and last.taken > began:
-                far = float(np.linalg.norm(last.place - wanted))
+                far = float(np.linalg.norm(last.place - target))
                 if far < APART:
                     return
             time.sleep(0.02)
         where = "not seen" if not np.isfinite(far) else f"seen {far:.2f} m from there"
         raise RuntimeError(
-            f"the puck is {where} within {PLACING:.0f} s (wanted at "
-            f"{np.round(wanted, 2)} m); {self._camera.trouble or 'is it there?'}"
+            f"the puck is {where} within {PLACING:.0f} s (target "
+            f"{np.round(target, 2)} m); "
+            f"{self._camera.trouble or 'put it at its target'}"
         )
 
     def _first_sightings(self) -> list[Sighting]:
-        """Return the first sightings of a puck that was let go just now."""
+        """Return the first sightings of a puck that was just released.
+
+        Raises:
+            RuntimeError: The puck is not seen often enough.
+        """
         self.watcher.take()
         seen: list[Sighting] = []
         until = time.monotonic() + LOST
@@ -275,7 +287,7 @@ class RealBackend(Backend):
             time.sleep(0.005)
             seen += self.watcher.take()
         if len(seen) < FIRST:
-            raise RuntimeError("the puck was not seen any more once it was let go")
+            raise RuntimeError("the puck was not seen after its release")
         return seen
 
     def stage(self, command: Command, before: State, after: State) -> Stage:
@@ -283,8 +295,8 @@ class RealBackend(Backend):
 
     def _move(self, command: Command, before: State, after: State) -> None:
         """Send the command, wait for the end of the step and fill ``after``."""
-        self._asked = command.velocity[0, 0].copy()
-        self.robot.send_action(self._asked, self.control_dt)
+        self._commanded = command.velocity[0, 0].copy()
+        self.robot.send_action(self._commanded, self.control_dt)
         self._due += self.control_dt
         left = self._due - time.monotonic()
         if left > 0:
@@ -292,7 +304,7 @@ class RealBackend(Backend):
         else:
             self._overruns += 1
             if left < -2 * self.control_dt:
-                # What was missed is not made up for by a hurry.
+                # Missed time is not made up for by shorter steps.
                 self._due = time.monotonic()
         now = time.monotonic()
         for name in ("touched", "banked", "crossed", "crossed_velocity", "lifted"):
@@ -305,7 +317,7 @@ class RealBackend(Backend):
             self.robot.disable()
 
     def _trouble(self, now: float) -> str:
-        """Return why the episode cannot go on; "" if it can."""
+        """Return why the episode cannot continue; "" if it can."""
         robot = self.robot
         if not robot.is_connected:
             return "robot: its driver has ended"
@@ -319,7 +331,13 @@ class RealBackend(Backend):
         return ""
 
     def _fill(self, state: State, now: float, since: float) -> None:
-        """Fill a state with what is there now, and what happened since a moment."""
+        """Fill a state with positions and velocities now and new contacts.
+
+        Args:
+            state: State of the one world.
+            now: Time of the state, s.
+            since: Time at which the step began, s.
+        """
         self._moment = now
         status = self.robot.get_observation()
         state.position[0, 0] = status.x, status.y
@@ -341,7 +359,7 @@ class RealBackend(Backend):
             "moment": self._moment,
             "robot": self.robot.state.name,
             "fault": self.robot.fault.label,
-            "asked": [round(float(x), 4) for x in self._asked],
+            "asked": [round(float(x), 4) for x in self._commanded],
             "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
             "sent_place": [round(status.sent_x, 4), round(status.sent_y, 4)],
             "height_mm": round(1e3 * status.z, 2),
@@ -363,7 +381,7 @@ class RealBackend(Backend):
     ) -> Array:
         frame = self._camera.newest
         if frame is None:
-            raise RuntimeError(self._camera.trouble or "camera: no picture yet")
+            raise RuntimeError(self._camera.trouble or "camera: no frame yet")
         if viewpoint == "rectified":
             return self.rectifier.rectify(frame.image, width)[..., ::-1]
         status = self.robot.get_observation()

@@ -1,8 +1,8 @@
-"""Events: contacts, banks and crossings between two sightings of a puck.
+"""Events: paddle contacts and wall bounces between two sightings of a puck.
 
-A camera sees a puck some times a second, and what it hits in between never. So it is
-flown on from the older sighting, and back from the newer one: where one of these ways
-comes to a paddle or a rail that it moves toward, there was a contact.
+A camera rarely takes a frame at the moment of a contact. So the puck's path is
+extrapolated forward from the older sighting and backward from the newer one. There was
+a contact where one of these paths meets a paddle or a rail that the puck moves toward.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
 MOMENTS = 9
-"""Moments between two sightings at which ways are looked at"""
+"""Number of times between two sightings at which the paths are checked"""
 MARGIN = 0.004
-"""Gap that is a contact, m: what calibration and noise leave open"""
+"""Largest gap that counts as a contact, m, for errors of calibration and noise"""
 
 
 class Track(NamedTuple):
-    """Puck at one moment."""
+    """Puck at one time."""
 
     time: float
     """s"""
@@ -32,32 +32,32 @@ class Track(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """What a puck met between two moments."""
+    """Contacts of a puck between two times."""
 
     paddle_at: float
-    """Time at which it met the paddle, s; nan if it did not"""
+    """Time of the contact with the paddle, s; nan without one"""
     banks: Array
-    """(sides,) bool"""
+    """(sides,) bool, True for sides with a wall bounce"""
     velocity: Array
-    """(2,) m/s, with which it came"""
+    """(2,) velocity before the contacts, m/s"""
 
 
 def find_contacts(
     scene: Scene, before: Track, after: Track, times: Array, paddle: Array
 ) -> Contacts:
-    """Return what a puck met between two moments.
+    """Return the contacts of a puck between two sightings.
 
     Args:
-        scene: table and sizes.
-        before: the older.
-        after: the newer.
-        times: (n,) s, at which the paddle was told.
-        paddle: (n, 2) its places then, m.
+        scene: Table and sizes of the bodies.
+        before: Older sighting.
+        after: Newer sighting.
+        times: (n,) times of the reported paddle positions, s.
+        paddle: (n, 2) reported positions of the paddle, table frame, m.
     """
     moments = np.linspace(before.time, after.time, MOMENTS)
     on = before.place + (moments - before.time)[:, None] * before.velocity
     back = after.place + (moments - after.time)[:, None] * after.velocity
-    # Each way is believed in the half that is nearer to its sighting.
+    # Each path is trusted in the half that is nearer to its sighting.
     half = MOMENTS // 2 + 1
     where = np.stack(
         [np.interp(moments, times, paddle[:, k]) for k in range(2)], axis=1

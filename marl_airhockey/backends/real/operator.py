@@ -1,4 +1,4 @@
-"""Operator: who puts the puck on the table where an episode is to begin."""
+"""Operator: puts the puck at its start position and allows the arm to move."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from marl_airhockey.types import Array
 ANSWER = 5.0
 """Longest time until a lab answers, s"""
 LOOK = 5.5
-"""Time for which an operator looks at an arm that has stopped, s"""
+"""Time for which the lab's operator inspects a stopped arm, s"""
 
 
 class Operator(Protocol):
@@ -24,37 +24,41 @@ class Operator(Protocol):
         """Return when the arm may move for the first time.
 
         Args:
-            motion: where it may move and how fast, in words.
+            motion: Text for a person: where the arm may move and how fast.
         """
 
     def place(self, puck: Array, velocity: Array) -> None:
-        """Put the puck at (2,), m, and hold it there.
+        """Put the puck at its start position and hold it there.
+
+        Args:
+            puck: (2,) start position, table frame, m.
+            velocity: (2,) velocity at the release, table frame, m/s.
 
         Raises:
-            RuntimeError: it is not done.
+            RuntimeError: The operator does not do it.
         """
 
     def release(self) -> None:
-        """Let the puck go, with the velocity it was to have as far as that can be."""
+        """Release the puck, with the requested velocity as far as possible."""
 
     def allow(self, stop: str) -> None:
-        """Return when somebody has looked at an arm that stopped and lets it go on.
+        """Return when a stopped arm has been inspected and may continue.
 
         Args:
-            stop: why it stopped, in words.
+            stop: Reason of the stop, as a text for a person.
         """
 
 
 Ask = Callable[[str], None]
-"""Function that shows words to a person and returns when they agree"""
+"""Function that shows a text to a person and returns when they agree"""
 
 
 class LabOperator:
-    """Operator of a virtual lab, who does exactly what is asked for.
+    """Operator of a virtual lab, which carries out requests exactly.
 
     Args:
-        port: of the lab's door, on the loopback address.
-        ask: who is asked whether a stopped arm may go on.
+        port: Port of the lab's door, on the loopback address.
+        ask: Function that asks whether a stopped arm may continue.
     """
 
     def __init__(self, port: int, ask: Ask) -> None:
@@ -64,14 +68,15 @@ class LabOperator:
         try:
             with socket.create_connection(self._address, ANSWER) as door:
                 door.sendall(json.dumps(order).encode() + b"\n")
-                answer = json.loads(door.makefile().readline() or "{}")
+                line = door.makefile().readline()
         except OSError as error:
-            raise RuntimeError(f"lab: it does not answer: {error}") from error
+            raise RuntimeError(f"lab: no answer: {error}") from error
+        answer = json.loads(line) if line else {"error": "it has ended"}
         if "error" in answer:
             raise RuntimeError(f"lab: {answer['error']}")
 
     def begin(self, motion: str) -> None:
-        """Return at once: in the virtual lab nobody is in the way."""
+        """Return immediately: there are no people in the virtual lab."""
 
     def place(self, puck: Array, velocity: Array) -> None:
         self._ask(do="place", puck=puck.tolist(), velocity=velocity.tolist())
@@ -87,24 +92,27 @@ class PersonOperator:
     """Operator who is a person.
 
     Args:
-        ask: how they are asked.
+        ask: Function that asks the person.
     """
 
     def __init__(self, ask: Ask) -> None:
         self._ask = ask
 
     def begin(self, motion: str) -> None:
-        self._ask(f"{motion} Is nobody within that, and the enabling device in a hand?")
+        self._ask(
+            f"{motion} Is this space free of people, and do you hold the enabling "
+            "device?"
+        )
 
     def place(self, puck: Array, velocity: Array) -> None:
         self._ask(
             f"Put the puck at x = {puck[0]:+.2f} m, y = {puck[1]:+.2f} m (from the "
-            "table's centre, away from the robot and to its left), hold it there, and "
-            "take the enabling device."
+            "table's centre; x points away from the robot, y to its left), hold it "
+            "there, and take the enabling device."
         )
 
     def release(self) -> None:
-        self._ask("Let the puck go with your word.")
+        self._ask("Confirm, and release the puck at the same time.")
 
     def allow(self, stop: str) -> None:
         self._ask(_stopped(stop))
@@ -112,8 +120,8 @@ class PersonOperator:
 
 def _stopped(why: str) -> str:
     return (
-        f"The arm has stopped: {why}. Look at it, clear what is in its way, and "
-        "release an emergency stop at the pendant. May it go on?"
+        f"The arm has stopped: {why}. Inspect it, clear its path, and release an "
+        "emergency stop at the pendant. May it continue?"
     )
 
 
@@ -121,19 +129,19 @@ def ask_at_terminal(words: str) -> None:
     """Ask a person at the terminal.
 
     Raises:
-        RuntimeError: nobody is there.
+        RuntimeError: The standard input is not a terminal.
     """
     if not sys.stdin.isatty():
         raise RuntimeError(
-            f"operator: nobody is at a terminal who could be asked: {words}"
+            f"operator: no terminal to ask a person at; run it in one: {words}"
         )
-    print(f"{words} Enter to go on, Ctrl+C to end.")
+    print(f"{words} Press Enter to continue, Ctrl+C to end.")
     input()
 
 
 def look(words: str) -> None:
-    """Agree, as the virtual lab's own person: who has looked at the arm for a while."""
-    # An arm refuses to go on earlier.
+    """Agree after `LOOK` seconds, as the virtual lab's operator."""
+    # A stopped arm refuses to continue earlier.
     time.sleep(LOOK)
 
 
@@ -142,10 +150,10 @@ def make_operator(text: str, ask: Ask | None = None) -> Operator:
 
     Args:
         text: ``person`` or ``lab:PORT``.
-        ask: who is asked; None for the terminal, or the lab's own person.
+        ask: Function that asks a person; None for the terminal, or `look` in a lab.
 
     Raises:
-        ValueError: an unknown one.
+        ValueError: The text names no operator.
     """
     kind, _, port = text.partition(":")
     if kind == "person" and not port:

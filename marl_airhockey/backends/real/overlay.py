@@ -1,4 +1,4 @@
-"""Overlay: a camera's picture with what is believed to be there drawn over it."""
+"""Overlay: a camera frame with the estimated bodies and marks drawn over it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 
 PUCK, PADDLE, MARK, RAIL = (255, 240, 0), (255, 140, 0), (0, 220, 120), (90, 140, 255)
 """Colours: red, green, blue"""
 AHEAD = 0.15
-"""Time for which an arrow goes on with the puck's velocity, s"""
+"""Time for which the velocity line extends the puck's motion, s"""
 
 
 class Overlay:
     """Overlay for one view of one table.
 
     Args:
-        view: of the camera.
-        table: that it sees.
+        view: View of the camera.
+        table: Table in the view.
     """
 
     def __init__(self, view: View, table: Table) -> None:
@@ -41,11 +41,11 @@ class Overlay:
         """Return (H, W, 3) uint8 RGB, ``width`` pixels wide.
 
         Args:
-            image: picture (H, W, 3), blue, green, red.
-            paddle: (2,) m.
-            puck: (4,) its place, m, and velocity, m/s; None if there is none.
-            marks: of the scenario.
-            width: of the result.
+            image: Frame (H, W, 3) uint8, blue, green, red.
+            paddle: (2,) position of the paddle, table frame, m.
+            puck: (4,) position, m, and velocity, m/s, of the puck; None without one.
+            marks: Marks of the scenario.
+            width: Width of the result, px.
         """
         drawn = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
         table = self._table

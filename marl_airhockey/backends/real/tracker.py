@@ -1,4 +1,4 @@
-"""Tracker: the puck's state, made of what a camera has seen and an arm has told."""
+"""Tracker: the puck's state from camera sightings and reported paddle positions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from marl_airhockey.devices.vision import Sighting
 from marl_airhockey.sensing.estimator import Estimator
 from marl_airhockey.types import Array
 
-WAY, PAST = 0.01, 40
-"""Time between two places of the paddle, s, and number of those behind that of now"""
+SPACING, PAST = 0.01, 40
+"""Time between two samples of the paddle's path, s, and number of past samples"""
 SMOOTHED = 0.05
-"""Share of the newest sighting in the mean distance from the estimate"""
+"""Weight of the newest sighting in the mean distance from the estimate"""
 WORLD = np.zeros(1, np.int64)
 """Index of the one world"""
 
@@ -26,31 +26,36 @@ class Tracker:
     """Tracker of the puck of one table.
 
     Args:
-        scene: of the table.
-        physics: ranges in which the table's may lie.
+        scene: Scene on the table.
+        physics: Ranges of the table's physical parameters.
     """
 
     def __init__(self, scene: Scene, physics: Physics) -> None:
         self._scene = scene
-        self._estimator = Estimator(scene, 1, physics, WAY)
+        self._estimator = Estimator(scene, 1, physics, SPACING)
         self._touching = False
         self.last: Track | None = None
         """Newest sighting, filtered; None before an episode begins."""
         self.noise = 0.0
-        """Mean distance of sightings from what the filter makes of them, m."""
+        """Mean distance of the sightings from the filtered positions, m."""
         if scene.pucks:
-            # Compiled here, not while a puck is on its way.
+            # Compiles the filter before an episode begins.
             nowhere = np.zeros(2)
             self.begin([Sighting(nowhere, 0.0, 1.0, nowhere)], nowhere)
             self._update(nowhere, 0.1, True, np.zeros((2, 3)), 0.1)
         self.forget()
 
     def forget(self) -> None:
-        """Know of no puck until an episode begins."""
+        """Forget the puck until the next episode begins."""
         self.last, self._touching, self.noise = None, False, 0.0
 
     def begin(self, seen: list[Sighting], paddle: Array) -> None:
-        """Begin with the first sightings of an episode, and the paddle (2,) now, m."""
+        """Begin an episode.
+
+        Args:
+            seen: First sightings of the puck, oldest first.
+            paddle: (2,) position of the paddle now, table frame, m.
+        """
         first, last = seen[0], seen[-1]
         velocity = (last.place - first.place) / max(last.taken - first.taken, 1e-3)
         self._estimator.reset(
@@ -75,14 +80,14 @@ class Tracker:
         now: float,
         since: float,
     ) -> None:
-        """Fill a state with the puck that is there now, and what it has met.
+        """Fill a state with the puck's estimate for now and its contacts.
 
         Args:
-            state: of one world, without contacts.
-            seen: what was seen since the last call.
-            track: (n, 3) time and places of the paddle.
-            now: time of the state, s.
-            since: time at which its step began, s.
+            state: State of one world, without contacts.
+            seen: Sightings since the last call, oldest first.
+            track: (n, 3) time, s, and position, m, of the paddle.
+            now: Time of the state, s.
+            since: Time at which the step began, s.
         """
         for sighting in seen:
             self._follow(state, sighting, track, now, since)
@@ -102,11 +107,11 @@ class Tracker:
         now: float,
         since: float,
     ) -> None:
-        """Take a sighting into the estimate and note what the puck met before it."""
+        """Update the estimate by a sighting and add the puck's contacts before it."""
         last, taken = self.last, sighting.taken
         if last is not None and taken <= last.time:
             return
-        # What the filter makes of it then, for the moment of the picture itself.
+        # The filtered position at the time of the frame itself.
         self._update(sighting.place, taken, True, track, taken)
         found = self._estimator.now[0, 0]
         new = self.last = Track(taken, found[:2].copy(), found[2:4].copy())
@@ -118,7 +123,7 @@ class Tracker:
         touching = bool(np.isfinite(met.paddle_at))
         if touching and not self._touching:
             state.touched[0, 0, 0] += 1
-            # Before 0, as it was seen later than it was.
+            # Negative for a contact before this step, which was observed late.
             state.touched_at[0, 0, 0] = min(met.paddle_at, now) - since
         self._touching = touching
         state.banked[0, 0] += met.banks
@@ -128,28 +133,28 @@ class Tracker:
                 state.crossed_velocity[0, 0, k] = met.velocity
 
     def _update(
-        self, place: Array, taken: float, fresh: bool, track: Array, now: float
+        self, position: Array, taken: float, fresh: bool, track: Array, now: float
     ) -> None:
-        ago = now - WAY * np.arange(PAST, -1, -1)
-        ways = np.stack([np.interp(ago, track[:, 0], track[:, k]) for k in (1, 2)], -1)
+        at = now - SPACING * np.arange(PAST, -1, -1)
+        path = np.stack([np.interp(at, track[:, 0], track[:, k]) for k in (1, 2)], -1)
         self._estimator.update_along(
             WORLD,
-            place.reshape(1, 1, 2),
+            position.reshape(1, 1, 2),
             np.full(1, taken),
             np.full((1, 1), fresh),
-            ways.reshape(1, -1, 1, 2),
+            path.reshape(1, -1, 1, 2),
             np.full(1, now),
         )
 
     def sight(self, looked_at: float) -> Array:
-        """Return (1, pucks, 4) x, y, m, visibility and age, s, in the newest picture.
+        """Return (1, pucks, 4) x, y, m, visibility and age, s, in the newest frame.
 
         Args:
-            looked_at: when that was taken, s.
+            looked_at: Time at which the newest frame was taken, s.
         """
-        last, age, place, visible = self.last, 0.0, np.zeros(2), 0.0
+        last, age, position, visible = self.last, 0.0, np.zeros(2), 0.0
         if last is not None:
-            age, place = time.monotonic() - last.time, last.place
+            age, position = time.monotonic() - last.time, last.place
             visible = float(looked_at - last.time < 1e-3)
-        row = np.array([*place, visible, age]).reshape(1, 1, 4)
+        row = np.array([*position, visible, age]).reshape(1, 1, 4)
         return np.repeat(row, self._scene.pucks, axis=1)

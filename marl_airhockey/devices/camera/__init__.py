@@ -1,7 +1,6 @@
-"""Cameras: sources of pictures with the time at which they were taken.
+"""Cameras: sources of frames with the time at which they were taken.
 
-A `Camera` keeps the newest frame alone, so that whoever looks late sees what is, not
-what was.
+A `Camera` keeps only the newest frame, so that a slow reader gets no outdated one.
 """
 
 from marl_airhockey.devices.camera.camera import Camera, CameraError, Frame, Source

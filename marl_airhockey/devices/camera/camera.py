@@ -1,4 +1,4 @@
-"""Camera: a thread that takes frames from a source and keeps the newest."""
+"""Camera: a thread that reads frames from a source and keeps the newest."""
 
 from __future__ import annotations
 
@@ -11,41 +11,41 @@ from typing import NamedTuple, Protocol, Self
 from marl_airhockey.types import Array
 
 STALE = 0.1
-"""Age of the newest frame beyond which a camera is silent, s"""
+"""Age of the newest frame beyond which frames are missing, s"""
 
 
 class CameraError(RuntimeError):
-    """Error of a camera that gives no pictures."""
+    """Error of a camera that delivers no frames."""
 
 
 class Frame(NamedTuple):
-    """Picture of a camera."""
+    """Frame of a camera."""
 
     image: Array
     """(H, W, 3) uint8, blue, green, red"""
     taken: float
-    """Time of the middle of its exposure, of the monotonic clock, s"""
+    """Time of the middle of the exposure, monotonic clock, s"""
     number: int
-    """Number in its source, from 0 on; gaps are frames that were dropped"""
+    """Number in the source, from 0 on; gaps are dropped frames"""
     arrived: float = float("nan")
-    """Time at which a `Camera` had it, of the monotonic clock, s"""
+    """Time at which a `Camera` received it, monotonic clock, s"""
 
 
 class Source(Protocol):
     """Source of frames, read by one thread."""
 
     def open(self) -> None:
-        """Begin.
+        """Start.
 
         Raises:
-            CameraError: there is nothing to read, with the fix.
+            CameraError: There is nothing to read; the message names a fix.
         """
 
     def read(self) -> Frame | None:
         """Wait for the next frame and return it; None at the end."""
 
     def close(self) -> None:
-        """End; a `read` that waits returns."""
+        """Stop; a waiting `read` returns."""
 
 
 class Camera:
@@ -54,7 +54,7 @@ class Camera:
     It is used in a ``with`` block.
 
     Args:
-        source: of the frames.
+        source: Source of the frames.
     """
 
     def __init__(self, source: Source) -> None:
@@ -65,14 +65,18 @@ class Camera:
         self._thread: threading.Thread | None = None
         self._error = ""
         self.dropped = 0
-        """Number of frames that nobody took before the next one came."""
+        """Number of frames that `next` did not return before a newer one came."""
         self._taken = -1
         self.listeners: list[Callable[[Frame], None]] = []
-        """Functions that get every frame, in the thread that reads: they return at
-        once."""
+        """Functions that get every frame, in the reading thread; they must return
+        immediately."""
 
     def __enter__(self) -> Self:
-        self._source.open()
+        try:
+            self._source.open()
+        except BaseException:
+            self._source.close()
+            raise
         self._closing = False
         self._thread = threading.Thread(target=self._read, name="camera", daemon=True)
         self._thread.start()
@@ -108,7 +112,7 @@ class Camera:
 
     @property
     def newest(self) -> Frame | None:
-        """Newest frame, for who only wants to show it; None before the first."""
+        """Newest frame, which still counts as dropped; None before the first."""
         return self._frame
 
     @property
@@ -119,7 +123,7 @@ class Camera:
 
     @property
     def trouble(self) -> str:
-        """Reason why there are no new frames; "" while there are."""
+        """Reason why there are no new frames; "" without a problem."""
         if self._error:
             return f"camera: {self._error}"
         if self._frame is None:
@@ -129,9 +133,9 @@ class Camera:
         return ""
 
     def next(self, after: int = -1, seconds: float = 1.0) -> Frame | None:
-        """Return the newest frame as soon as its number exceeds ``after``.
+        """Wait for a frame with a number above ``after`` and return the newest one.
 
-        None if none comes within some seconds.
+        Return None if none arrives within ``seconds``.
         """
         with self._new:
             self._new.wait_for(

@@ -1,7 +1,7 @@
-"""Film: all pictures of a camera in a video file that survives a kill.
+"""Film: all frames of a camera in a video file that stays readable after a kill.
 
-Beside it a text file has a line for each picture: the time at which it was taken, s, of
-the monotonic clock. A video's own rate knows of no picture that was missed.
+A text file next to it has a line for each frame: the time at which it was taken, s,
+monotonic clock. The video's constant rate does not show missing frames.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from marl_airhockey.devices.camera.camera import Camera, Frame
 from marl_airhockey.types import Array
 
 SUFFIX = ".mkv"
-"""Ending of the files: Matroska with Motion JPEG, readable as far as it was written"""
+"""Suffix of the files: Matroska with Motion JPEG, readable as far as it was written"""
 FIRST = 4
-"""Pictures from which the rate of a camera is found"""
+"""Number of frames from which the rate of a camera is measured"""
 MOST = 90
-"""Pictures that may wait to be written: 80 MB of 640 x 480"""
+"""Largest number of frames in the queue: 80 MB of 640 x 480"""
 QUALITY = 92
 """JPEG quality"""
 
 
 class Film:
-    """Film of a camera, written by a thread of its own until it is closed.
+    """Film of a camera, written by its own thread until it is closed.
 
     Args:
-        camera: that is open.
-        path: of the file.
+        camera: Open camera.
+        path: Path of the video file.
     """
 
     def __init__(self, camera: Camera, path: Path) -> None:
@@ -50,17 +50,17 @@ class Film:
 
     @property
     def last(self) -> tuple[int, float] | None:
-        """Number in the file, and time taken, s, of the newest picture; None before."""
+        """Index in the file and time, s, of the newest frame; None before the first."""
         return self._last
 
     @property
     def trouble(self) -> str:
-        """What is missing in the file and why; "" while nothing is."""
+        """Description of what is missing in the file; "" if it is complete."""
         if self._failed:
-            return f"{self._path}: no video can be written there"
+            return f"{self._path}: no video can be written to this path"
         if self._dropped:
             return (
-                f"{self._path}: {self._dropped} pictures are missing, as they came "
+                f"{self._path}: {self._dropped} pictures are missing, as they arrived "
                 "faster than they could be written"
             )
         return ""
@@ -72,36 +72,43 @@ class Film:
             self._dropped += 1
 
     def _write(self) -> None:
+        """Write frames as they arrive; the first few tell the rate of the file."""
         first: list[Frame] = []
-        count = 0
         while (frame := self._waiting.get()) is not None:
             first.append(frame)
             if self._writer is None and len(first) < FIRST:
                 continue
             if self._writer is None and not self._open(first):
                 return
-            for each in first:
-                self._writer.write(each.image)
-                self._times.write(f"{each.taken:.6f}\n")
-                self._last = count, each.taken
-                count += 1
+            self._append(first)
             first.clear()
+        if first and self._open(first):
+            self._append(first)
+
+    def _append(self, frames: list[Frame]) -> None:
+        """Append some frames and their times."""
+        count = 0 if self._last is None else self._last[0] + 1
+        for each in frames:
+            self._writer.write(each.image)
+            self._times.write(f"{each.taken:.6f}\n")
+            self._last = count, each.taken
+            count += 1
 
     def _open(self, frames: list[Frame]) -> bool:
-        """Open the file at the rate of some frames; return False if it cannot be."""
+        """Open the file at the rate of some frames; return whether that worked."""
         steps = frames[-1].number - frames[0].number
         rate = steps / max(frames[-1].taken - frames[0].taken, 1e-3)
         height, width = frames[0].image.shape[:2]
         code = cv2.VideoWriter.fourcc(*"MJPG")
         self._writer = cv2.VideoWriter(
-            str(self._path), code, round(rate, 2), (width, height)
+            str(self._path), code, max(round(rate, 2), 1.0), (width, height)
         )
         self._writer.set(cv2.VIDEOWRITER_PROP_QUALITY, QUALITY)
         self._failed = not self._writer.isOpened()
         return not self._failed
 
     def close(self) -> None:
-        """End the file; a warning says what is missing in it."""
+        """Close the file; warn if frames are missing in it."""
         self._camera.listeners.remove(self._take)
         self._waiting.put(None)
         self._thread.join(5.0)
@@ -113,20 +120,20 @@ class Film:
 
 
 def times_file(path: Path) -> Path:
-    """Return the path of the times of a film."""
+    """Return the path of the file with a film's times."""
     return path.with_suffix(".times.txt")
 
 
 def read_times(path: Path) -> Array:
-    """Return the times (N,) at which the pictures of a film were taken, s.
+    """Return the times (N,) at which the frames of a film were taken, s.
 
     Raises:
-        ValueError: there are none, or what is there are no times.
+        ValueError: The file of times is missing or holds something else.
     """
     file = times_file(path)
     try:
-        # The last line may have been cut off.
+        # The last line may be incomplete.
         lines = file.read_text().split("\n")[:-1]
         return np.array([float(line) for line in lines])
     except (OSError, ValueError) as error:
-        raise ValueError(f"{file}: the times of the film: {error}") from error
+        raise ValueError(f"{file}: cannot read the film's times: {error}") from error

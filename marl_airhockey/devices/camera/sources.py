@@ -1,4 +1,4 @@
-"""Sources of frames: a file, a stream, a function, or what a text names."""
+"""Sources of frames: video files, streams of other processes, and functions."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from marl_airhockey.devices.camera.v4l2 import (
 from marl_airhockey.types import Array
 
 HEADER = struct.Struct(">4sQdII")
-"""Head of a frame in a stream: `MAGIC`, number, time taken, height, width"""
+"""Header of a frame in a stream: `MAGIC`, number, time taken, height, width"""
 MAGIC = b"AIRF"
 CONNECT = 3.0
-"""Longest time until a stream answers, s"""
+"""Longest time until a stream is connected, s"""
 
 
 class FileSource:
-    """Source that is a video file, at its own pace or as fast as it is read.
+    """Source of the frames of a video file.
 
     Args:
-        path: of the file.
-        realtime: whether to wait between frames.
+        path: Path of the file.
+        realtime: Whether to wait between frames, as given by the file's rate.
     """
 
     def __init__(self, path: str | Path, realtime: bool = True) -> None:
@@ -45,7 +45,7 @@ class FileSource:
     def open(self) -> None:
         self._capture = cv2.VideoCapture(str(self._path))
         if not self._path.exists() or not self._capture.isOpened():
-            raise CameraError(f"{self._path}: there is no video that can be read")
+            raise CameraError(f"{self._path}: there is no video that OpenCV can read")
         self.rate = self._capture.get(cv2.CAP_PROP_FPS) or 30.0
         """Frames a second."""
         self._began = time.monotonic()
@@ -66,11 +66,11 @@ class FileSource:
 
 
 class StreamSource:
-    """Source that is a stream of raw frames from another process of this machine.
+    """Source of raw frames from another process on this machine.
 
     Args:
-        port: on the loopback address.
-        host: that address; times are those of this machine's clock.
+        port: TCP port of the stream.
+        host: Address of this machine, as the times are of its monotonic clock.
     """
 
     def __init__(self, port: int, host: str = "127.0.0.1") -> None:
@@ -92,7 +92,9 @@ class StreamSource:
             return None
         magic, number, taken, height, width = HEADER.unpack(head)
         if magic != MAGIC:
-            raise CameraError("the stream holds something else than frames")
+            raise CameraError(
+                f"stream at port {self._address[1]}: expected frames, got other data"
+            )
         body = self._take(height * width * 3)
         if body is None:
             return None
@@ -101,7 +103,7 @@ class StreamSource:
         )
 
     def _take(self, size: int) -> bytearray | None:
-        """Return the next bytes; None if the stream ends before."""
+        """Return the next bytes; None if the stream ends before that."""
         assert self._socket is not None
         buffer, done = bytearray(size), 0
         view = memoryview(buffer)
@@ -124,11 +126,11 @@ class StreamSource:
 
 
 class SyntheticSource:
-    """Source that draws its frames itself.
+    """Source of frames that a function draws.
 
     Args:
-        draw: function (time taken, s) -> (H, W, 3) uint8.
-        rate: frames a second.
+        draw: Function of the time taken, s, that returns an image (H, W, 3) uint8.
+        rate: Frame rate, 1/s.
     """
 
     def __init__(self, draw: Callable[[float], Array], rate: float = 30.0) -> None:
@@ -151,7 +153,7 @@ class SyntheticSource:
 
 
 def pack_frame(frame: Frame) -> bytes:
-    """Return a frame as it is sent in a stream."""
+    """Return the bytes of a frame in a stream."""
     height, width, _ = frame.image.shape
     head = HEADER.pack(MAGIC, frame.number, frame.taken, height, width)
     return head + frame.image.tobytes()
@@ -163,16 +165,16 @@ def open_source(text: str, latency: float = LATENCY) -> Source:
     Args:
         text: ``v4l2:0`` with settings (``v4l2:0,exposure=60,gain=20``, see
             `CaptureSettings`), ``stream:PORT``, or the path of a video.
-        latency: of a camera of this machine, see `CapturedSource`.
+        latency: Latency of a V4L2 camera, s, see `CapturedSource`.
 
     Raises:
-        ValueError: neither, or an unknown setting.
+        ValueError: The text names no source, or a setting is unknown.
     """
     kind, _, rest = text.partition(":")
     if kind in ("v4l2", "stream"):
         number, *words = rest.split(",")
         if not number.isdigit() or (words and kind == "stream"):
-            raise ValueError(f"camera {text!r}: expected {kind}: and a number")
+            raise ValueError(f"camera {text!r}: expected {kind}:NUMBER")
         if kind == "stream":
             return StreamSource(int(number))
         pairs = {name: value for name, _, value in (w.partition("=") for w in words)}

@@ -1,7 +1,7 @@
-"""Camera of this machine, by V4L2, with nothing left to its automatics.
+"""Camera of this machine, by V4L2, with all automatic controls switched off.
 
-A camera that adapts exposure, gain or white balance changes the colours that the vision
-was told; what adapts is switched off, whatever else is set.
+Automatic exposure, gain and white balance would change the calibrated colours. They are
+switched off whatever else is set.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ import cv2
 from marl_airhockey.devices.camera.camera import CameraError, Frame
 
 LATENCY = 0.025
-"""Time from the middle of an exposure until its picture is here, s, unless it was
-measured: half an exposure of 8 ms, the readout and the transfer of a PS Eye"""
+"""Latency without a measurement, from the middle of an exposure until its frame has
+arrived, s: half an exposure of 8 ms, the readout and the transfer of a PS Eye"""
 SET_CONTROL = 0xC008561C
 """Request VIDIOC_S_CTRL of the kernel's interface, videodev2.h"""
 CONTROL = struct.Struct("=Ii")
@@ -33,7 +33,7 @@ CONTROLS = {
     "gain": (0x00980913,),
     "white_balance": (0x0098091A,),
 }
-"""Controls of each setting: cameras have one of them"""
+"""Controls of each setting; a camera has one of them"""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class CaptureSettings:
     """Settings of a camera, in its own units (``v4l2-ctl --list-ctrls``).
 
     Raises:
-        ValueError: a width, height or rate that is not above 0.
+        ValueError: Width, height or rate is not above 0.
     """
 
     width: int = 640
@@ -49,9 +49,9 @@ class CaptureSettings:
     height: int = 480
     """px"""
     rate: int = 60
-    """Frames a second"""
+    """Frame rate, 1/s"""
     exposure: int | None = None
-    """None, here and below, for what the camera has now"""
+    """None keeps the camera's present value, here and below"""
     gain: int | None = None
     white_balance: int | None = None
 
@@ -67,24 +67,24 @@ class CaptureSettings:
         """Return the settings of NAME=VALUE pairs.
 
         Raises:
-            ValueError: an unknown name, or a value that is no whole number.
+            ValueError: A name is unknown, or a value is not a whole number.
         """
         known = [f.name for f in fields(CaptureSettings)]
         for name, value in words.items():
             if name not in known:
-                raise ValueError(f"camera: unknown setting {name!r}; there are {known}")
+                raise ValueError(f"camera: unknown setting {name!r}; expected {known}")
             if not value.lstrip("-").isdigit():
                 raise ValueError(f"camera: {name}={value!r} must be a whole number")
         return CaptureSettings(**{name: int(value) for name, value in words.items()})
 
 
 class CapturedSource:
-    """Source that is a camera of this machine.
+    """Source of the frames of a V4L2 camera.
 
     Args:
-        device: its number.
-        settings: of its pictures.
-        latency: s from the middle of an exposure until the picture is here.
+        device: Number of the video device.
+        settings: Settings of the camera; None for the defaults.
+        latency: Time from the middle of an exposure until its frame has arrived, s.
     """
 
     def __init__(
@@ -104,10 +104,10 @@ class CapturedSource:
         capture = cv2.VideoCapture(self._device, cv2.CAP_V4L2)
         if not capture.isOpened():
             raise CameraError(
-                f"{self._path} cannot be opened: does another program use it?"
+                f"{self._path} cannot be opened; end other programs that use it"
             )
         self._capture = capture
-        # A PS Eye would send raw Bayer pictures, 30 a second.
+        # By default, a PS Eye sends raw Bayer frames at 30 Hz.
         capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*"YUYV"))
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, settings.width)
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height)
@@ -118,17 +118,17 @@ class CapturedSource:
         if (width, height) != (settings.width, settings.height):
             self.close()
             raise CameraError(
-                f"{self._path} gives pictures of {width} x {height}, not of "
-                f"{settings.width} x {settings.height}; name a size that it has: "
+                f"{self._path} delivers frames of {width} x {height}, not of "
+                f"{settings.width} x {settings.height}; use a size that it has: "
                 f"v4l2:{self._device},width={width},height={height}"
             )
         self._set_controls()
 
     def _check_device(self) -> None:
-        """Refuse a device that there is not, or that may not be opened.
+        """Refuse a device that does not exist or that may not be opened.
 
         Raises:
-            CameraError: with the remedy.
+            CameraError: The device is refused; the message names a fix.
         """
         if not self._path.exists():
             there = sorted(str(path) for path in Path("/dev").glob("video*"))
@@ -142,15 +142,15 @@ class CapturedSource:
             )
 
     def _set_controls(self) -> None:
-        """Switch all that is automatic off and set what is given.
+        """Switch automatic controls off and apply the given settings.
 
         Raises:
-            CameraError: the camera refuses a value that was given.
+            CameraError: The camera refuses a given value.
         """
         descriptor = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
         try:
             for control, value in AUTOMATIC.items():
-                # A camera without an automatic has no such control.
+                # Some cameras lack some of these controls.
                 _set_control(descriptor, control, value)
             for name, controls in CONTROLS.items():
                 value = getattr(self._settings, name)
@@ -167,7 +167,7 @@ class CapturedSource:
     def read(self) -> Frame | None:
         found, image = self._capture.read()
         if not found:
-            raise CameraError(f"{self._path} gives no more pictures")
+            raise CameraError(f"{self._path} delivers no more frames")
         self._count += 1
         return Frame(image, time.monotonic() - self._latency, self._count - 1)
 
@@ -177,7 +177,7 @@ class CapturedSource:
 
 
 def _set_control(descriptor: int, control: int, value: int) -> bool:
-    """Set a control; return False if the camera refuses."""
+    """Set a control; return False if the camera refuses it."""
     try:
         fcntl.ioctl(descriptor, SET_CONTROL, CONTROL.pack(control, value))
     except OSError:

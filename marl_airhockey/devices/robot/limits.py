@@ -1,7 +1,7 @@
-"""Limits of an arm's joints, as its controller tells them, and what a table needs.
+"""Limits of an arm's joints, read from its controller, and a check of a table's reach.
 
-A controller tells nobody the safety limits of its tool (speed and force), which are
-read from the pendant by a person; those of its joints are in its state.
+The controller's state has the limits of the joints, but not the safety limits of the
+tool (speed and force). A person reads those from the pendant.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ from marl_airhockey.devices.robot.mounting import Mounting
 from marl_airhockey.types import Array
 
 STATE_PORT = 30012
-"""Port of a controller's state, which takes nothing"""
+"""Read-only port of a controller's state"""
 STATE, JOINT_DATA, CONFIGURATION = 16, 1, 6
-"""Numbers of a message and of two of its packages, by the maker's documents"""
+"""Numbers of a message and of two of its packages, see the maker's documentation"""
 JOINT = struct.Struct(">3d4fB")
-"""Joint in its package; the first is its angle, rad"""
+"""Joint in its package; the first number is its angle, rad"""
 BOUNDS = struct.Struct(f">{4 * JOINTS}d")
 """Least and largest angle of each joint, then its largest speed and acceleration"""
 ANSWER = 3.0
-"""Longest time until a controller tells its state, s"""
+"""Longest time until a controller sends its state, s"""
 SHARE = 0.95
-"""Largest share of a joint's speed that motion in the reach may need"""
+"""Largest share of a joint's speed limit that motion in the reach may need"""
 SPACING = 9
-"""Number of places that are tried along each side of the reach"""
+"""Number of checked positions along each side of the reach"""
 
 
 class JointLimits(NamedTuple):
-    """Limits of the joints and where they are."""
+    """Limits of the joints and their present angles."""
 
     least: Array
-    """(6,) rad"""
+    """(6,) least angles, rad"""
     most: Array
-    """(6,) rad"""
+    """(6,) largest angles, rad"""
     speed: Array
-    """(6,) rad/s"""
+    """(6,) largest speeds, rad/s"""
     angles: Array
-    """(6,) rad, now"""
+    """(6,) present angles, rad"""
 
 
 def read_limits(host: str, port: int = STATE_PORT) -> JointLimits:
@@ -58,15 +58,15 @@ def read_limits(host: str, port: int = STATE_PORT) -> JointLimits:
 
     Args:
         host: Address of the controller.
-        port: Port that sends its state.
+        port: Port that sends the controller's state.
 
     Raises:
-        OSError: no controller answers, or it tells no limits.
+        OSError: No controller answers, or it reports no limits.
     """
     with socket.create_connection((host, port), ANSWER) as link:
         link.settimeout(ANSWER)
         file = link.makefile("rb")
-        # The first message is the version, and not each state has all packages.
+        # The first message is the version; not every state has all packages.
         for _ in range(20):
             size, kind = struct.unpack(">iB", _exactly(file.read, 5))
             body = _exactly(file.read, size - 5)
@@ -105,17 +105,17 @@ def _limits(packages: dict[int, bytes]) -> JointLimits:
 def check_reach(
     limits: JointLimits, mounting: Mounting, tool: Array, reach: Array, speed: float
 ) -> None:
-    """Refuse a reach in which an arm would come to the limits of its joints.
+    """Refuse a reach in which an arm would exceed the limits of its joints.
 
     Args:
-        limits: of the arm.
-        mounting: of the table.
-        tool: (6,) pose of the paddle's foot in the flange's frame.
+        limits: Limits of the arm's joints.
+        mounting: Mounting of the table.
+        tool: (6,) pose of the paddle's foot, flange frame, m and rad.
         reach: (n, 2) polygon of the paddle's centre, table frame, m.
-        speed: of the paddle, in any direction, m/s.
+        speed: Top speed of the paddle, in any direction, m/s.
 
     Raises:
-        ValueError: what is beyond them, and where.
+        ValueError: A joint exceeds its limits; the message names where.
     """
     flange_of = np.linalg.inv(pose_of(tool))
     angles, rotation = limits.angles, np.array(mounting.rotation)
@@ -138,7 +138,7 @@ def check_reach(
         ways = np.zeros((6, 2))
         ways[:3] = rotation[:, :2]
         needed = np.stack([joint_speeds(jacobian, way) for way in ways.T])
-        # The fastest of all directions in the plane is the norm over two of them.
+        # The largest speed over all directions is the norm over the two axes.
         share = speed * np.linalg.norm(needed, axis=0) / limits.speed
         if share.max() > SHARE:
             raise ValueError(
@@ -149,7 +149,7 @@ def check_reach(
 
 
 def _places(reach: Array) -> Array:
-    """Return places in a polygon (n, 2), (m, 2), each near the one before."""
+    """Return positions (m, 2) in a polygon (n, 2), each near the one before."""
     low, high = reach.min(0), reach.max(0)
     lines = [
         np.column_stack([np.full(SPACING, x), np.linspace(low[1], high[1], SPACING)])

@@ -1,4 +1,4 @@
-"""Mounting: where a table lies in the frame of a robot's base."""
+"""Mounting: pose of a table in the base frame of a robot."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class Mounting:
-    """Pose of the table in the base frame of a robot, and of the tool on the table."""
+    """Pose of the table and orientation of the tool, base frame of a robot."""
 
     origin: tuple[float, float, float]
     """Table's centre, base frame, m"""
     rotation: tuple[tuple[float, float, float], ...]
-    """(3, 3) from the table frame to the base's"""
+    """(3, 3) rotation from the table frame to the base frame"""
     tool: tuple[float, float, float]
-    """Rotation vector of the tool that stands on the table, base frame"""
+    """Rotation vector of the tool on the table, base frame, rad"""
     residual: float = 0.0
-    """Root of the mean squared error of the fit, m"""
+    """Root mean square error of the fit, m"""
     points: int = 0
-    """Number of points that it was fitted to"""
+    """Number of points of the fit"""
     _origin: Array = field(init=False, repr=False, compare=False)
     _rotation: Array = field(init=False, repr=False, compare=False)
 
@@ -41,7 +41,7 @@ class Mounting:
         residual: float = 0.0,
         points: int = 0,
     ) -> Self:
-        """Return the mounting of some arrays (3,), (3, 3) and (3,)."""
+        """Return a mounting with the arrays (3,), (3, 3) and (3,) as tuples."""
         x, y, z = origin.tolist()
         a, b, c = tool.tolist()
         rows = tuple(tuple(row) for row in rotation.tolist())
@@ -49,40 +49,45 @@ class Mounting:
 
     @property
     def tilt(self) -> float:
-        """Angle between the table's plane and the base's, deg."""
+        """Angle between the planes of the table and of the base, deg."""
         return float(np.degrees(np.arccos(np.clip(self._rotation[2, 2], -1.0, 1.0))))
 
     def pose(self, place: Array, height: float = 0.0) -> Array:
-        """Return the pose (6,), base frame, of a tool over (2,), table frame, m."""
+        """Return the pose (6,), base frame, of a tool above the table, m and rad.
+
+        Args:
+            place: (2,) position, table frame, m.
+            height: Height above the table, m.
+        """
         point = self._origin + self._rotation @ (place[0], place[1], height)
         return np.concatenate([point, self.tool])
 
     def frame(self) -> Array:
-        """Return the table's frame as a pose (6,), base frame."""
+        """Return the pose (6,) of the table frame, base frame, m and rad."""
         import cv2
 
         return np.concatenate([self.origin, cv2.Rodrigues(self._rotation)[0][:, 0]])
 
     def to_table(self, pose: Array) -> Array:
-        """Return (3,) of the tool's centre, table frame, m, from a pose (6,)."""
+        """Return the position (3,), table frame, m, of a pose (6,), base frame."""
         return np.asarray((np.asarray(pose)[:3] - self._origin) @ self._rotation)
 
     def rotate_to_table(self, velocity: Array) -> Array:
-        """Return (3,) a velocity, base frame, in the table's."""
+        """Return a velocity (3,), base frame, in the table frame, m/s."""
         return np.asarray(np.asarray(velocity)[:3] @ self._rotation)
 
 
 def fit_mounting(points: Array, touched: Array, tool: Array) -> Mounting:
-    """Fit a mounting to places that a tool has touched.
+    """Fit a mounting to points that a tool has touched.
 
     Args:
-        points: (n, 2) places on the table, table frame, m; at least 3, not in a line.
-        touched: (n, 3) the tool's centre there, base frame, m.
-        tool: (3,) rotation vector of the tool.
+        points: (n, 2) points on the table, table frame, m; at least 3, not in a line.
+        touched: (n, 3) tool centre at these points, base frame, m.
+        tool: (3,) rotation vector of the tool, base frame, rad.
 
     Raises:
-        ValueError: too few points, all in a line, or a table whose plane the tool would
-            touch from below: what the camera sees is mirrored.
+        ValueError: Too few points, all in a line, or mirrored: the tool would touch the
+            table from below.
     """
     points, touched = np.asarray(points, float), np.asarray(touched, float)
     if len(points) < 3 or len(points) != len(touched):

@@ -1,13 +1,13 @@
-"""Shaper: the last filter before an arm, for each of its poses.
+"""Shaper: the last filter before an arm, applied to each commanded position.
 
-From target velocities, which may be anything, it makes positions that an arm can
-follow: within its speed, its acceleration and its jerk, and never beyond the reach. It
-continues from its last output, not from the measured position of the arm.
+It turns arbitrary target velocities into positions that an arm can follow: within
+limits of speed, acceleration and jerk, and inside the reach. It continues from its last
+output, not from the measured position of the arm.
 
-What holds the limits for any target: after every step the paddle could still be braked
-to rest within speed and reach. A step after which it could not is mixed with the
-braking step, which is always safe: it begins the braking that was checked one step
-before.
+The limits hold for any target, because after every step the paddle can still brake to
+rest within speed and reach. A step that would break this is mixed with the braking
+step. The braking step is always safe, as it begins the braking that was checked one
+step before.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 HALVINGS = 4
-"""Steps of the search for a mixture with braking"""
+"""Number of bisection steps in the search for a mixture with braking"""
 LONGEST = 250
-"""Steps within which every braking is over"""
+"""Largest number of steps until rest"""
 AT_REST = 1e-9
 """Speed, m/s, and acceleration, m/s2, below which braking is over"""
 
@@ -33,7 +33,7 @@ class MotionLimits:
     """Limits of a paddle's motion.
 
     Raises:
-        ValueError: a limit that is not above 0.
+        ValueError: A limit is not a finite number above 0.
     """
 
     speed: float = 0.7
@@ -63,7 +63,7 @@ class Shaper:
         reach: (K, 2) convex polygon of the paddle's centre, counter-clockwise, m.
         dt: Time between two steps, s.
         place: (2,) position of the resting paddle, m.
-        margin: Distance from the edge of the reach that is kept, m.
+        margin: Least distance from the edge of the reach, m.
     """
 
     def __init__(
@@ -79,38 +79,37 @@ class Shaper:
         normals, offsets = half_planes(corners)
         self._offsets = offsets - margin
         self._normals = normals[:, 0] + 1j * normals[:, 1]
-        # Edges that meet share what can be braked with, as in the world's limits.
+        # Adjacent edges share the acceleration for braking, as in the world's limits.
         meet = (normals * np.roll(normals, -1, 0)).sum(-1).min()
         self._braking = limits.acceleration * np.sqrt((1.0 + meet) / 2.0)
-        # Vectors are complex numbers: a hundred times as fast as arrays of two.
+        # Vectors are complex numbers, which are 100 times as fast as arrays of two.
         self._place, self._velocity = complex(*place), 0j
         self._acceleration = 0j
-        # A paddle that begins outside may come in, and move no further out.
+        # A paddle that begins outside may move in, but not further out.
         outside = -((self._normals.conj() * self._place).real + self._offsets)
         self._widened = self._offsets + np.maximum(outside, 0.0)
 
     @property
     def place(self) -> Array:
-        """(2,) position that the arm was sent to last, m."""
+        """(2,) last commanded position, m."""
         return _array(self._place)
 
     @property
     def velocity(self) -> Array:
-        """(2,) m/s, there."""
+        """(2,) velocity at the last commanded position, m/s."""
         return _array(self._velocity)
 
     @property
     def acceleration(self) -> Array:
-        """(2,) m/s2, with which it got there."""
+        """(2,) acceleration of the last step, m/s2."""
         return _array(self._acceleration)
 
     def step(self, velocity: Array, seconds: float) -> Array:
         """Move by ``dt`` and return the new position (2,), m.
 
         Args:
-            velocity: (2,) target velocity, m/s; one that is not finite is rest.
-            seconds: Time in which it is to be reached by a linear ramp, s; 0 for
-                immediately.
+            velocity: (2,) target velocity, m/s; rest if it is not finite.
+            seconds: Time of a linear ramp to it, s; 0 for as fast as possible.
         """
         target = self._inside(_fitted(complex(*velocity), self._limits.speed))
         moved = self._velocity, self._acceleration
@@ -129,12 +128,12 @@ class Shaper:
     def _toward(
         self, target: complex, seconds: float, velocity: complex, acceleration: complex
     ) -> complex:
-        """Return the next acceleration, on the way to a velocity."""
+        """Return the next acceleration toward a target velocity."""
         limits, dt = self._limits, self._dt
         change = target - velocity
         size, pull = abs(change), 0j
         if size > 0.0:
-            # Toward the end of a change the jerk must still fit in.
+            # Near the target, the jerk limits the acceleration.
             most = min(
                 limits.acceleration,
                 size / max(seconds, dt),
@@ -145,7 +144,7 @@ class Shaper:
         return _fitted(acceleration + jerk, limits.acceleration)
 
     def _recoverable(self, wish: complex) -> complex:
-        """Return ``wish``, or as much of it as leaves braking within all limits."""
+        """Return ``wish``, mixed with braking as far as all limits need it."""
         if self._can_brake(wish):
             return wish
         braking = best = self._toward(0j, 0.0, self._velocity, self._acceleration)
@@ -158,7 +157,7 @@ class Shaper:
         return best
 
     def _can_brake(self, acceleration: complex) -> bool:
-        """Return whether one step so, and braking after it, keeps speed and reach."""
+        """Return whether a step, and braking after it, keep to speed and reach."""
         place, velocity, dt = self._place, self._velocity, self._dt
         way = []
         for _ in range(LONGEST):
@@ -174,10 +173,10 @@ class Shaper:
         return False
 
     def _inside(self, velocity: complex) -> complex:
-        """Return a velocity from which a stop in front of every edge still fits."""
+        """Return a velocity from which the paddle can stop before every edge."""
         limits = self._limits
         room = (self._normals.conj() * self._place).real + self._offsets
-        # Way of a stop from v: v^2 / 2a, and v times the time until it brakes fully.
+        # Stopping distance from v: v^2 / 2a, and v times the delay of full braking.
         late = limits.acceleration / limits.jerk + 2.0 * self._dt
         root = np.sqrt(late**2 + 2.0 * np.maximum(room, 0.0) / self._braking)
         fastest = self._braking * (root - late)

@@ -1,4 +1,4 @@
-"""Vision: where a puck is, from the picture of a calibrated camera."""
+"""Vision: the position of a puck from the frames of a calibrated camera."""
 
 from marl_airhockey.devices.vision.colour import Colour
 from marl_airhockey.devices.vision.detector import Detector, Sighting

@@ -15,19 +15,20 @@ TAGS = cv2.aruco.DICT_4X4_50
 TAG = 0.08
 """Width of a printed tag's black square, m"""
 LEAST_TAGS = 4
-"""Number of tags that must be seen"""
+"""Least number of tags that must be seen"""
 WORST = 2.0
-"""Largest error of a corner, px, beyond which a calibration is refused"""
+"""Largest accepted error of a calibration's fit, px"""
 MOVED = 2.0
-"""Error of the tags, px, at which a camera is not where it was calibrated"""
+"""Error of the tags, px, above which the camera or the table has moved"""
 DARK = 40.0
-"""Mean of a picture, of 255, below which it is dark"""
+"""Mean brightness of a frame, of 255, below which it is dark"""
 
 
 def tag_corners(place: Array) -> Array:
-    """Return the corners (4, 2) of a tag about its middle (2,), m, as they are found.
+    """Return the corners (4, 2) of an upright tag in the order of `find_tags`, m.
 
-    It lies upright in the table's frame.
+    Args:
+        place: (2,) position of its centre, table frame, m.
     """
     half = TAG / 2
     around = np.array([(-half, half), (half, half), (half, -half), (-half, -half)])
@@ -35,11 +36,11 @@ def tag_corners(place: Array) -> Array:
 
 
 def find_tags(image: Array) -> dict[int, Array]:
-    """Return the corners (4, 2), px, of the tags in a picture, by their numbers."""
+    """Return the corners (4, 2), px, of the tags in a frame, by their numbers."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-    words = cv2.aruco.getPredefinedDictionary(TAGS)
-    corners, numbers, _ = cv2.aruco.ArucoDetector(words, parameters).detectMarkers(
+    markers = cv2.aruco.getPredefinedDictionary(TAGS)
+    corners, numbers, _ = cv2.aruco.ArucoDetector(markers, parameters).detectMarkers(
         image
     )
     if numbers is None:
@@ -51,45 +52,45 @@ def find_tags(image: Array) -> dict[int, Array]:
 def view_from_tags(
     seen: Mapping[int, Array], known: Mapping[int, Array], lens: Lens
 ) -> View:
-    """Return the view in which tags of known places are seen.
+    """Fit a view to tags at known positions.
 
     Args:
-        seen: corners (4, 2) by number, px, as `find_tags` returns them.
-        known: corners (4, 2) by number, table frame, m, in the same order.
-        lens: of the camera.
+        seen: Corners (4, 2) by number, px, as `find_tags` returns them.
+        known: Corners (4, 2) by number, table frame, m, in the same order.
+        lens: Lens of the camera.
 
     Raises:
-        ValueError: too few tags, or corners that do not fit together.
+        ValueError: Too few tags, or corners that no view fits.
     """
     both = sorted(seen.keys() & known.keys())
     if len(both) < LEAST_TAGS:
         raise ValueError(
             f"{len(both)} of {len(known)} tags are seen, at least {LEAST_TAGS} are "
-            "needed: is something in front of them, or is it too dark?"
+            "needed; uncover them and check the light"
         )
     pixels = np.concatenate([seen[k] for k in both])
-    places = np.concatenate([known[k] for k in both])
-    return _view(pixels, places, lens)
+    positions = np.concatenate([known[k] for k in both])
+    return _view(pixels, positions, lens)
 
 
 def view_from_clicks(pixels: Array, places: Array, lens: Lens) -> View:
-    """Return the view from at least four clicked points.
+    """Fit a view to at least four clicked points.
 
     Args:
-        pixels: (n, 2).
-        places: (n, 2) table frame, m.
-        lens: of the camera.
+        pixels: (n, 2) clicked points, px.
+        places: (n, 2) positions of these points, table frame, m.
+        lens: Lens of the camera.
 
     Raises:
-        ValueError: fewer than four, or points that do not fit together.
+        ValueError: Fewer than four points, or points that no view fits.
     """
     if len(pixels) < 4 or len(pixels) != len(places):
-        raise ValueError(f"{len(pixels)} points: click at least four, in their order")
+        raise ValueError(f"{len(pixels)} points: click at least four, in order")
     return _view(np.asarray(pixels, float), np.asarray(places, float), lens)
 
 
-def _view(pixels: Array, places: Array, lens: Lens) -> View:
-    points = np.column_stack([places, np.zeros(len(places))])
+def _view(pixels: Array, positions: Array, lens: Lens) -> View:
+    points = np.column_stack([positions, np.zeros(len(positions))])
     found, rotation, translation = cv2.solvePnP(
         points, pixels, *lens.arrays, flags=cv2.SOLVEPNP_IPPE
     )
@@ -105,8 +106,8 @@ def _view(pixels: Array, places: Array, lens: Lens) -> View:
     residual = float(np.sqrt((off**2).mean()))
     if residual > WORST:
         raise ValueError(
-            f"the points fit to {residual:.1f} px, {WORST:.1f} px is allowed: is a "
-            "tag not where it should be, or a point clicked in another order?"
+            f"the points fit to {residual:.1f} px, {WORST:.1f} px is allowed; check "
+            "the positions of the tags, or the order of the clicks"
         )
     return View(lens, vector, shift, residual)  # type: ignore[arg-type]
 
@@ -114,20 +115,20 @@ def _view(pixels: Array, places: Array, lens: Lens) -> View:
 def view_trouble(
     view: View, pictures: Sequence[Array], known: Mapping[int, Array]
 ) -> str:
-    """Return why pictures do not show a table as it was calibrated; "" if they do.
+    """Return why frames do not fit a calibration; "" if they do.
 
     Args:
-        view: of the calibration.
-        pictures: (H, W, 3) uint8 each, at least one.
-        known: corners (4, 2) of the tags by number, table frame, m; without any,
-            nothing tells whether the camera was moved.
+        view: View of the calibration.
+        pictures: Images (H, W, 3) uint8, at least one.
+        known: Corners (4, 2) of the tags by number, table frame, m. Without tags, a
+            movement of the camera is not detected.
     """
     height, width = pictures[0].shape[:2]
     if (width, height) != tuple(view.lens.size):
         return (
             f"its pictures are {width} x {height}, those of the calibrated camera "
             f"{view.lens.size[0]} x {view.lens.size[1]}; set that size, or calibrate "
-            "anew"
+            "again"
         )
     if not known:
         return ""
@@ -138,22 +139,28 @@ def view_trouble(
         dark = f", and the picture is dark (mean {light:.0f} of 255)"
         return (
             f"none of the table's tags is seen{dark if light < DARK else ''}; is this "
-            "the camera over the table, are the lights on, is the lens free?"
+            "the camera over the table, are the lights on, is the lens uncovered?"
         )
     if np.median(seen) > MOVED:
         return (
             f"the tags are {np.median(seen):.1f} px from where they were; the camera "
-            "was moved or the table was: calibrate anew"
+            "or the table was moved: calibrate again"
         )
     return ""
 
 
 def moved(view: View, seen: Mapping[int, Array], known: Mapping[int, Array]) -> float:
-    """Return by how far tags are not where a view has them, px; nan if none is seen."""
+    """Return the median error of the tags' corners in a view, px; nan without tags.
+
+    Args:
+        view: View of the calibration.
+        seen: Corners (4, 2) by number, px, as `find_tags` returns them.
+        known: Corners (4, 2) by number, table frame, m.
+    """
     both = sorted(seen.keys() & known.keys())
     if not both:
         return float("nan")
-    places = np.concatenate([known[k] for k in both])
-    points = np.column_stack([places, np.zeros(len(places))])
+    positions = np.concatenate([known[k] for k in both])
+    points = np.column_stack([positions, np.zeros(len(positions))])
     off = view.project(points) - np.concatenate([seen[k] for k in both])
     return float(np.median(np.linalg.norm(off, axis=1)))

@@ -1,4 +1,4 @@
-"""Colour: the pixels that may belong to a puck."""
+"""Colour: a range of colours, such as that of a puck, and its pixels in a frame."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 from marl_airhockey.types import Array
 
 HUES = 180
-"""Hues that OpenCV has in 8 bits"""
+"""Number of hues of OpenCV in 8 bits"""
 FAINT = 0.2
-"""Share of the most colour in a picture below which a pixel does not count"""
+"""Share of the largest amount of a colour below which a pixel does not count"""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Colour:
     """Range of colours, by hue, saturation and brightness."""
 
     hue: float
-    """Middle of the range, 0 .. 180; red is at both ends"""
+    """Centre of the range, 0 .. 180; red is at both ends"""
     width: float = 10.0
     """Half-width of the range of hues"""
     saturation: int = 100
@@ -30,12 +30,12 @@ class Colour:
     """Least brightness, 0 .. 255"""
 
     def mask(self, image: Array) -> Array:
-        """Return (H, W) uint8, 255 where a picture (H, W, 3) has this colour."""
+        """Return (H, W) uint8, 255 where an image (H, W, 3) has this colour."""
         hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         least = (self.saturation, self.brightness)
         low, high = round(self.hue - self.width), round(self.hue + self.width)
         found = cv2.inRange(hsv, (max(low, 0), *least), (min(high, HUES), 255, 255))
-        # Beyond one end of the hues the range goes on at the other.
+        # The hues are a circle: the range continues at the other end.
         beyond = (low + HUES, HUES) if low < 0 else (0, high - HUES)
         if low < 0 or high > HUES:
             more = cv2.inRange(hsv, (beyond[0], *least), (beyond[1], 255, 255))
@@ -44,7 +44,7 @@ class Colour:
 
     @cached_property
     def _axis(self) -> Array:
-        """(3,) blue, green, red: direction in which only this hue is coloured."""
+        """(3,) blue, green, red: unit direction of this hue, orthogonal to grey."""
         pure = np.array([[[round(self.hue) % HUES, 255, 255]]], np.uint8)
         blue, green, red = cv2.cvtColor(pure, cv2.COLOR_HSV2BGR)[0, 0].astype(float)
         axis = np.array([blue, green, red])
@@ -52,10 +52,10 @@ class Colour:
         return np.asarray(axis / np.linalg.norm(axis))
 
     def middle(self, image: Array) -> Array:
-        """Return the middle (2,), px, of what has this colour in a small picture.
+        """Return the centre (2,), px, of an object of this colour in a small image.
 
-        Each pixel counts by how much of the colour it holds. That is linear in light,
-        so that a shadow beside it draws it nowhere, as it does a mask.
+        Each pixel is weighted by its amount of the colour, which is linear in light.
+        So a shadow next to the object does not shift the centre, as it does in a mask.
         """
         amount = image.astype(np.float32) @ self._axis
         weights = np.maximum(amount - FAINT * amount.max(), 0.0)
@@ -67,10 +67,15 @@ class Colour:
 
     @staticmethod
     def around(image: Array, pixel: tuple[float, float], radius: int = 4) -> Colour:
-        """Return the colours about a pixel (x, y) of something that has one colour.
+        """Return the range of the colours around a pixel of a uniform object.
+
+        Args:
+            image: Image (H, W, 3) uint8, blue, green, red.
+            pixel: Position (x, y), px.
+            radius: Half-width of the evaluated square, px.
 
         Raises:
-            ValueError: what is there has no colour: it is grey, white or black.
+            ValueError: The pixel is outside of the image, or grey, white or black.
         """
         x, y = round(pixel[0]), round(pixel[1])
         part = image[max(y - radius, 0) : y + radius + 1, max(x - radius, 0) :]
@@ -83,8 +88,8 @@ class Colour:
         saturation, brightness = np.percentile(hsv[:, 1:], 5, axis=0)
         if saturation < 60:
             raise ValueError(
-                f"pixel {pixel}: what is there has no colour (saturation "
-                f"{saturation:.0f} of 255); click the puck, or give it a colour"
+                f"pixel {pixel}: the object has no colour (saturation "
+                f"{saturation:.0f} of 255); click the puck, or make it colourful"
             )
         off = np.abs((hsv[:, 0] - mean + HUES / 2) % HUES - HUES / 2)
         width = max(float(np.percentile(off, 95)) + 4.0, 6.0)

@@ -1,4 +1,4 @@
-"""Detector: the place of a puck, or of a paddle's top, in one picture."""
+"""Detector: the position of a puck, or of a paddle's top, in one frame."""
 
 from __future__ import annotations
 
@@ -16,27 +16,26 @@ from marl_airhockey.devices.vision.lens import View
 from marl_airhockey.types import Array
 
 LEAST, MOST = 0.35, 1.8
-"""Share of a whole puck's area that something must have to be one"""
+"""Range of an area that may be a puck, as shares of a whole puck's area"""
 WHOLE = 0.93
-"""Share above which its middle is that of its pixels"""
+"""Share above which a puck counts as not hidden"""
 RIM = 2
-"""Pixels about what has a puck's colour in which some of it may be"""
+"""Margin around an area of the colour, px, in which there may be more of it"""
 ROUND = 0.12
-"""Largest root mean square distance of the edge of a hidden puck from a circle, in
-radii"""
+"""Largest distance of a point of a puck's edge from a fitted circle, in radii"""
 
 
 class Sighting(NamedTuple):
-    """Puck that was seen in a picture."""
+    """Puck, or paddle's top, in one frame."""
 
     place: Array
-    """(2,) table frame, m"""
+    """(2,) position, table frame, m"""
     taken: float
-    """Time at which its row was exposed, of the monotonic clock, s"""
+    """Time at which its row was exposed, monotonic clock, s"""
     share: float
-    """Share of the puck that is visible"""
+    """Visible share of the disc"""
     pixel: Array
-    """(2,) of its middle"""
+    """(2,) centre of the disc, px"""
 
 
 @dataclass(frozen=True)
@@ -48,21 +47,21 @@ class Detector:
     radius: float
     """Radius of the disc, m"""
     extent: tuple[float, float]
-    """Half of the table's length and width, m; nothing is sought beyond"""
+    """Half of the table's length and width, m; the search is limited to the table"""
     height: float = 0.003
-    """Height of its rim above the table, m"""
+    """Height of the disc's rim above the table, m"""
     readout: float = 0.0
-    """Time from the exposure of the first row to that of the last, s: of a camera with
+    """Time from the exposure of the first row to that of the last, s, for a camera with
     a rolling shutter"""
 
     def find(self, frame: Frame) -> Sighting | None:
-        """Return where the disc is, the largest if there are several; None for none."""
+        """Return the largest disc of the colour; None without one."""
         return next(self._discs(frame), None)
 
     def find_all(self, frame: Frame) -> list[Sighting]:
         """Return all discs of the colour.
 
-        Parts of one that is hidden in its middle count once: their whole discs overlap.
+        Two visible parts of one disc count once, as their completed discs overlap.
         """
         found: list[Sighting] = []
         for seen in self._discs(frame):
@@ -74,7 +73,7 @@ class Detector:
         return found
 
     def _discs(self, frame: Frame) -> Iterator[Sighting]:
-        """Give the discs among the largest parts that have the colour."""
+        """Yield the discs among the three largest areas of the colour."""
         x, y, right, bottom = self._part
         image = frame.image[y:bottom, x:right]
         mask = self.colour.mask(image)
@@ -82,8 +81,8 @@ class Detector:
         for k in 1 + np.argsort(stats[1:, cv2.CC_STAT_AREA])[::-1][:3]:
             found = self._judge(image, labels, stats[k], middles[k], int(k))
             if found is not None:
-                place, pixel, share = found
-                yield Sighting(place, self._time(frame, pixel), share, pixel)
+                position, pixel, share = found
+                yield Sighting(position, self._time(frame, pixel), share, pixel)
 
     def _time(self, frame: Frame, pixel: Array) -> float:
         rows = frame.image.shape[0]
@@ -91,7 +90,7 @@ class Detector:
 
     @cached_property
     def _part(self) -> tuple[int, int, int, int]:
-        """Part of a picture in which the table is: left, top, right, bottom, px."""
+        """Part of a frame that shows the table: left, top, right, bottom, px."""
         along = np.linspace(-1.0, 1.0, 9)
         rim = [(a, s) for a in along for s in (-1.0, 1.0)]
         rim += [(s, a) for a, s in rim]
@@ -105,13 +104,13 @@ class Detector:
     def _judge(
         self, image: Array, labels: Array, box: Array, middle: Array, label: int
     ) -> tuple[Array, Array, float] | None:
-        """Return place, pixel and visible share if a component is a puck."""
+        """Return position, m, pixel and visible share if a component is a disc."""
         corner = np.array(self._part[:2], float)
         middle = middle + corner
-        place = self.view.to_table(middle, self.height)[0]
-        if (np.abs(place) > np.asarray(self.extent) + self.radius).any():
+        position = self.view.to_table(middle, self.height)[0]
+        if (np.abs(position) > np.asarray(self.extent) + self.radius).any():
             return None
-        whole = np.pi * (self.radius * self.view.scale(place, self.height)) ** 2
+        whole = np.pi * (self.radius * self.view.scale(position, self.height)) ** 2
         share = float(box[cv2.CC_STAT_AREA]) / whole
         if not LEAST < share < MOST:
             return None
@@ -131,16 +130,16 @@ class Detector:
         return completed, pixel, share
 
     def _complete(self, part: Array, corner: Array) -> Array | None:
-        """Return the middle of a partly hidden puck, from the round part of its edge.
+        """Return the centre of a partly hidden disc, from the round part of its edge.
 
-        Its radius is known: of the circles through two points of the edge the one that
-        most of the edge lies on is taken, and refined on these.
+        The radius is known. Of the circles through two points of the edge, the one with
+        the most points of the edge is taken and refined on these points.
         """
         contours, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         edge = max(contours, key=len)[:, 0, :] + corner
         if len(edge) < 12:
             return None
-        # A pixel's middle lies half a pixel inside the edge.
+        # The centre of an edge pixel lies half a pixel inside the edge.
         points = self.view.to_table(edge, self.height)
         inner = self.radius - 0.5 / self.view.scale(points.mean(0), self.height)
         tried = points[:: max(len(points) // 16, 1)]
@@ -149,7 +148,7 @@ class Detector:
             return None
         gaps = np.abs(np.linalg.norm(points - centres[:, None], axis=-1) - inner)
         close = gaps < ROUND * self.radius
-        # No part of what is visible lies outside of the puck.
+        # No visible part may lie outside of the disc.
         beyond = np.linalg.norm(points - centres[:, None], axis=-1) > 1.15 * self.radius
         score = close.sum(1) - 2 * beyond.sum(1)
         best = int(np.argmax(score))
@@ -158,16 +157,16 @@ class Detector:
             return None
         centre = centres[best]
         for _ in range(4):
-            ways = on - centre
-            sizes = np.linalg.norm(ways, axis=1)
-            directions = ways / sizes[:, None]
+            offsets = on - centre
+            sizes = np.linalg.norm(offsets, axis=1)
+            directions = offsets / sizes[:, None]
             step, *_ = np.linalg.lstsq(directions, sizes - inner, rcond=None)
             centre = centre + step
         return np.asarray(centre)
 
 
 def _centres(points: Array, radius: float) -> Array:
-    """Return the centres (m, 2) of the circles of a radius through pairs of points."""
+    """Return centres (m, 2) of the circles of one radius through pairs of points."""
     first, second = np.triu_indices(len(points), 3)
     a, b = points[first], points[second]
     half = (b - a) / 2

@@ -1,4 +1,4 @@
-"""Edges: clicked corners of a table, made exact by the edges between them."""
+"""Edges: clicked corners of a table, refined by the edges between them."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from marl_airhockey.devices.vision.lens import Lens
 from marl_airhockey.types import Array
 
 SAMPLES = 80
-"""Places along an edge at which it is looked for"""
+"""Number of points along an edge at which it is searched"""
 ACROSS = 6.0
-"""Distance from the clicked line within which it is looked for, px"""
+"""Largest distance of the search from the clicked line, px"""
 FINE = 0.25
-"""Distance between two pixels that are looked at, px"""
+"""Distance between two samples of the search, px"""
 BORDER = 0.04
-"""Share of an edge at either end that is left out: corners are round"""
+"""Share of an edge at either end that is left out, as corners are round"""
 OUTLIER = 1.0
-"""Distance from a line, px, beyond which a place does not count"""
+"""Least distance from a line, px, at which a point may be an outlier"""
 FEWEST = 20
-"""Places that a line must go through"""
+"""Least number of points on a line"""
 
 
 def refine_corners(image: Array, clicks: Array, lens: Lens) -> Array:
-    """Return corners (n, 2), px, where the edges of a table meet.
+    """Return the corners (n, 2), px, in which the edges of a table meet.
 
     Args:
-        image: picture (H, W, 3).
-        clicks: (n, 2) px of its corners, in order around it.
-        lens: of the camera.
+        image: Image (H, W, 3) uint8, blue, green, red.
+        clicks: (n, 2) clicked corners, px, in order around the table.
+        lens: Lens of the camera.
 
     Raises:
-        ValueError: an edge that is not seen, named by its corners.
+        ValueError: An edge is not seen; the message names its corners.
     """
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0).astype(np.float32)
@@ -46,15 +46,15 @@ def refine_corners(image: Array, clicks: Array, lens: Lens) -> Array:
 
 
 def _line(image: Array, start: Array, end: Array, lens: Lens, k: int) -> Array:
-    """Return a line (3,) through an edge, in coordinates without the lens."""
+    """Return a line (3,) through an edge, in normalized undistorted coordinates."""
     matrix, distortion = lens.arrays
     ends = cv2.undistortPoints(
         np.array([start, end], float).reshape(-1, 1, 2), matrix, distortion
     ).reshape(-1, 2)
     along = np.linspace(BORDER, 1.0 - BORDER, SAMPLES)[:, None]
     middle = ends[0] + along * (ends[1] - ends[0])
-    way = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
-    normal = np.array([-way[1], way[0]])
+    tangent = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    normal = np.array([-tangent[1], tangent[0]])
     offsets = np.arange(-ACROSS, ACROSS + FINE, FINE) / matrix[0, 0]
     points = middle[:, None] + offsets[None, :, None] * normal
     rays = np.concatenate([points, np.ones((*points.shape[:2], 1))], -1).reshape(-1, 3)
@@ -62,7 +62,7 @@ def _line(image: Array, start: Array, end: Array, lens: Lens, k: int) -> Array:
     at = pixels.reshape(*points.shape).astype(np.float32)
     shown = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
     slopes = np.abs(np.gradient(shown, axis=1))
-    # The middle of the slope, not its steepest pixel: that is exact to a tenth.
+    # The centre of the slope is exact to 0.1 px, its steepest pixel is not.
     best = slopes.argmax(1)
     near = np.abs(np.arange(len(offsets)) - best[:, None]) * FINE <= 2.0
     weights = np.where(near, slopes, 0.0)
@@ -72,7 +72,7 @@ def _line(image: Array, start: Array, end: Array, lens: Lens, k: int) -> Array:
     for _ in range(4):
         if good.sum() < FEWEST:
             raise ValueError(
-                f"the edge between corners {k + 1} and {k + 2} is not seen: click "
+                f"the edge between corners {k + 1} and {k + 2} is not seen; click "
                 "where the playing field meets the rail"
             )
         slope, offset = np.polyfit(position[good], found[good], 1)

@@ -1,6 +1,6 @@
-"""Lens and view: from places over a table to pixels, and back.
+"""Lens and view: from points above a table to pixels, and back.
 
-Points are transformed, never pictures: that is as exact and costs microseconds.
+Only points are transformed, not images, which is as exact and takes microseconds.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Lens:
     matrix: tuple[tuple[float, float, float], ...]
     """(3, 3) camera matrix, px"""
     distortion: tuple[float, ...]
-    """Coefficients as OpenCV has them: k1, k2, p1, p2, k3"""
+    """Coefficients in OpenCV's order: k1, k2, p1, p2, k3"""
     size: tuple[int, int]
-    """Width and height of the pictures, px"""
+    """Width and height of the frames, px"""
     residual: float = 0.0
-    """Root of the mean squared error of its calibration, px"""
+    """Root mean square error of the calibration, px"""
 
     @cached_property
     def arrays(self) -> tuple[Array, Array]:
@@ -37,23 +37,23 @@ class Lens:
 
 @dataclass(frozen=True)
 class View:
-    """View of a table by a camera that stays where it is."""
+    """View of a table by a fixed camera."""
 
     lens: Lens
     rotation: tuple[float, float, float]
-    """Rotation vector from the table frame to the camera's"""
+    """Rotation vector from the table frame to the camera frame, rad"""
     translation: tuple[float, float, float]
-    """Table's centre in the camera's frame, m"""
+    """Table's centre, camera frame, m"""
     residual: float = 0.0
-    """Root of the mean squared error of its calibration, px"""
+    """Root mean square error of the calibration, px"""
 
     @staticmethod
     def from_json(given: Mapping[str, Any]) -> View:
-        """Return the view that a JSON object holds, as `dataclasses.asdict` makes it.
+        """Return the view of a JSON object, as `dataclasses.asdict` makes it.
 
         Raises:
-            KeyError: a field is missing.
-            TypeError: there is another field, or one of another kind.
+            KeyError: A field is missing.
+            TypeError: A field is unknown, or has another type.
         """
         view = dict(given)
         lens = dict(view.pop("lens"))
@@ -69,7 +69,7 @@ class View:
 
     @cached_property
     def centre(self) -> Array:
-        """(3,) place of the camera, table frame, m."""
+        """(3,) position of the camera, table frame, m."""
         rotation, translation = self._pose
         return np.asarray(-rotation.T @ translation)
 
@@ -84,16 +84,21 @@ class View:
         return np.asarray(pixels).reshape(-1, 2)
 
     def to_table(self, pixels: Array, height: float = 0.0) -> Array:
-        """Return the places (n, 2), m, at a height over the table, of pixels (n, 2)."""
+        """Return the positions (n, 2), m, of pixels (n, 2) at a height above the table.
+
+        Args:
+            pixels: (n, 2) px.
+            height: Height above the table, m.
+        """
         flat = np.asarray(pixels, float).reshape(-1, 1, 2)
         rays = cv2.undistortPoints(flat, *self.lens.arrays).reshape(-1, 2)
         rotation, _ = self._pose
-        ways = np.column_stack([rays, np.ones(len(rays))]) @ rotation
-        steps = (height - self.centre[2]) / ways[:, 2]
-        return np.asarray(self.centre[:2] + steps[:, None] * ways[:, :2])
+        directions = np.column_stack([rays, np.ones(len(rays))]) @ rotation
+        steps = (height - self.centre[2]) / directions[:, 2]
+        return np.asarray(self.centre[:2] + steps[:, None] * directions[:, :2])
 
     def scale(self, place: Array, height: float = 0.0) -> float:
-        """Return the pixels that a metre has at a place (2,)."""
+        """Return the scale of the image at a position (2,), table frame, m, px/m."""
         x, y = place
         ends = [[x, y, height], [x + 0.01, y, height], [x, y + 0.01, height]]
         here, ahead, aside = self.project(np.array(ends))

@@ -1,4 +1,4 @@
-"""Watcher: a thread that looks for a disc in every picture of a camera."""
+"""Watcher: a thread that searches every frame of a camera for a disc."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from marl_airhockey.devices.camera import Camera
 from marl_airhockey.devices.vision.detector import Detector, Sighting
 
 KEPT = 256
-"""Sightings that are kept until somebody takes them"""
+"""Largest number of sightings that are kept until `Watcher.take`"""
 
 
 class Watcher:
     """Watcher of a puck, or of a paddle.
 
     Args:
-        camera: whose pictures it looks at.
-        detector: of what it looks for.
+        camera: Open camera.
+        detector: Detector of the disc.
     """
 
     def __init__(self, camera: Camera, detector: Detector) -> None:
@@ -27,13 +27,13 @@ class Watcher:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="watcher", daemon=True)
         self.last: Sighting | None = None
-        """Newest sighting."""
+        """Newest sighting; None before the first."""
         self.looked_at = float("nan")
-        """Time at which the newest picture was taken, s."""
+        """Time at which the newest searched frame was taken, s."""
         self.seconds = 0.0
-        """CPU time that looking has taken, s."""
+        """CPU time of the detector so far, s."""
         self.pictures = 0
-        """Number of pictures that were looked at."""
+        """Number of frames that were searched."""
         self._thread.start()
 
     def _watch(self) -> None:
@@ -52,13 +52,13 @@ class Watcher:
                 self._found.append(seen)
 
     def take(self) -> list[Sighting]:
-        """Return what was seen since the last call, the oldest first."""
+        """Return the sightings since the last call, oldest first."""
         seen = []
         while self._found:
             seen.append(self._found.popleft())
         return seen
 
     def close(self) -> None:
-        """End."""
+        """End the thread."""
         self._ended.set()
         self._thread.join(1.0)

@@ -1,1 +1,1 @@
-"""Calibration: from a camera, printed tags and an arm to a rig's file."""
+"""Calibration: makes a rig's file from a camera, printed tags and an arm."""

@@ -1,9 +1,9 @@
-"""Arm: how it follows what it is sent, by steps and chirps.
+"""Arm: identification of its response to commands, by steps and chirps.
 
-What it was sent goes through a model, a dead time and then a critically damped lag of
-second order (`core.servo`, which simulated arms have), and the two numbers of the
-model are those whose answer lies on what the arm reported. The gain and the phase at
-some frequencies, without any model, say whether it fits.
+The model is a dead time followed by a critically damped lag of second order, as for
+simulated arms (`core.servo`). A least-squares fit of the reported positions to the
+model's response gives both parameters. Gain and phase at some frequencies, which need
+no model, show whether it fits.
 """
 
 from __future__ import annotations
@@ -23,31 +23,31 @@ from marl_airhockey.lab.calibration.motion import Motion, lead
 from marl_airhockey.types import Array
 
 STEP_SPEED, STEP_SECONDS = 0.4, 0.4
-"""Speed of the steps to and fro, m/s, and how long each lasts, s"""
+"""Speed of the steps back and forth, m/s, and time of each step, s"""
 STEPS = 16
 """Number of steps of a trial"""
 CHIRP_SPEED = 0.25
 """Largest speed of a chirp, m/s"""
 CHIRP = (0.5, 5.0)
-"""Its frequencies, Hz"""
+"""First and last frequency of a chirp, Hz"""
 CHIRP_SECONDS = 12.0
-"""Time in which it goes from one to the other, s"""
+"""Time of a chirp, s"""
 GRID = 0.001
-"""Time between the samples with which the model is computed, s"""
+"""Time between the samples of the model's response, s"""
 FIRST, NUDGE = (0.01, 0.06), 1e-4
-"""Dead time and half-rise from which they are looked for, and the step of slopes, s"""
+"""Initial dead time and half-rise time of the fit, and the step of its slopes, s"""
 LONGEST = 0.4
-"""Largest of them, s"""
+"""Largest dead time and half-rise time, s"""
 SETTLE = 0.5
-"""Time after which the beginning is forgotten, s"""
+"""Time of the motion before the fitted part, s"""
 FREQUENCIES = (1.0, 2.0, 3.0, 4.0)
-"""Frequencies at which gain and phase are told, Hz"""
+"""Frequencies at which gain and phase are reported, Hz"""
 Path = Callable[[float], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
 class ArmTrial:
-    """Trial of one motion along one axis."""
+    """Result of one motion along one axis."""
 
     motion: str
     """``steps`` or ``chirp``"""
@@ -56,11 +56,11 @@ class ArmTrial:
     action_delay: float
     """Dead time, s"""
     servo_time: float
-    """Time in which the lag makes half of a step, s"""
+    """Time to 50 % of a step of the lag, s"""
     misfit: float
-    """Root mean square of what the model leaves, m"""
+    """Root mean square residual of the model, m"""
     response: dict[float, tuple[float, float]]
-    """Gain, and phase in degrees, by frequency, Hz; of chirps"""
+    """Gain and phase, deg, by frequency, Hz; empty for steps"""
 
 
 def measure_arm(
@@ -68,15 +68,15 @@ def measure_arm(
     repeats: int = 2,
     tell: Callable[[int], None] = lambda done: None,
 ) -> list[ArmTrial]:
-    """Move the arm by steps and chirps along both axes; return what is found in each.
+    """Move the arm by steps and chirps along both axes; return the result of each.
 
     Args:
-        rig: of the table.
-        repeats: number of times that each motion is made.
-        tell: called with the number of trials that are done.
+        rig: Rig of the table.
+        repeats: Number of repetitions of each motion.
+        tell: Function that is called with the number of finished motions.
 
     Raises:
-        RuntimeError: the arm stops.
+        RuntimeError: The arm stops.
     """
     reach = make_seat("robot", TABLES[rig.table], 0).reach
     home, found = np.mean(reach, 0), []
@@ -93,26 +93,31 @@ def measure_arm(
 
 
 def along(path: Callable[[float], tuple[float, float]], axis: int) -> Path:
-    """Return a path along an axis."""
-    way = np.eye(2)[axis]
+    """Return a path in the plane from a path along an axis.
+
+    Args:
+        path: Function of the time, s, that returns position, m, and velocity, m/s.
+        axis: 0 for x, 1 for y.
+    """
+    direction = np.eye(2)[axis]
 
     def at(now: float) -> tuple[Array, Array]:
-        place, speed = path(now)
-        return place * way, speed * way
+        position, speed = path(now)
+        return position * direction, speed * direction
 
     return at
 
 
 def steps(now: float) -> tuple[float, float]:
-    """Return place, m, and velocity, m/s, of steps of the velocity to and fro."""
+    """Return position, m, and velocity, m/s, of velocity steps back and forth."""
     count, part = divmod(now + STEP_SECONDS / 2, STEP_SECONDS)
     sign = 1.0 if count % 2 == 0 else -1.0
-    place = sign * STEP_SPEED * (part - STEP_SECONDS / 2)
-    return place, sign * STEP_SPEED
+    position = sign * STEP_SPEED * (part - STEP_SECONDS / 2)
+    return position, sign * STEP_SPEED
 
 
 def chirp(now: float) -> tuple[float, float]:
-    """Return place, m, and velocity, m/s, of a motion to and fro ever faster."""
+    """Return position, m, and velocity, m/s, of an oscillation of rising frequency."""
     first, last = CHIRP
     growth = np.log(last / first) / CHIRP_SECONDS
     frequency = first * np.exp(growth * now)
@@ -122,24 +127,24 @@ def chirp(now: float) -> tuple[float, float]:
 
 
 def find_lag(motion: Motion, axis: int, name: str) -> ArmTrial:
-    """Return the trial that a motion along an axis was.
+    """Fit the model to a motion along an axis.
 
     Args:
-        motion: reported and sent, from rest on.
+        motion: Reported and sent motion, which begins at rest.
         axis: 0 for x, 1 for y.
-        name: of the motion.
+        name: Name of the motion, ``steps`` or ``chirp``.
     """
     sent, reported = (rows[:, [0, 1 + axis]] for rows in (motion.sent, motion.reported))
-    # What it was sent before the first row is not known: it rested there.
+    # Commands before the first row are unknown; the arm was at rest.
     began = sent[0, 0] + SETTLE
     times = np.arange(sent[0, 0], min(sent[-1, 0], reported[-1, 0]), GRID)
     given = np.interp(times, *sent.T)
-    wanted = reported[(reported[:, 0] >= began) & (reported[:, 0] <= times[-1])]
+    fitted = reported[(reported[:, 0] >= began) & (reported[:, 0] <= times[-1])]
 
     def off(times_of: Array) -> Array:
         dead, half = times_of
-        answer = np.interp(wanted[:, 0] - dead, times, _lagged(given, float(half)))
-        return np.asarray(answer - wanted[:, 1])
+        answer = np.interp(fitted[:, 0] - dead, times, _lagged(given, float(half)))
+        return np.asarray(answer - fitted[:, 1])
 
     best = _least(off)
     response = {}
@@ -152,7 +157,12 @@ def find_lag(motion: Motion, axis: int, name: str) -> ArmTrial:
 
 
 def _lagged(given: Array, half: float) -> Array:
-    """Return the answer of the critically damped lag to samples of a place."""
+    """Return the response of the critically damped lag to sampled positions.
+
+    Args:
+        given: (n,) commanded positions, `GRID` apart, m.
+        half: Time to 50 % of a step, s.
+    """
     w = HALF / max(half, 1e-4)
     left = np.exp(-w * GRID)
     answer = np.empty_like(given)
@@ -165,9 +175,9 @@ def _lagged(given: Array, half: float) -> Array:
 
 
 def _least(off: Callable[[Array], Array]) -> Array:
-    """Return the dead time and the half-rise (2,), s, of least squares of ``off``.
+    """Return dead time and half-rise time (2,), s, with the least squares of ``off``.
 
-    By Levenberg and Marquardt's method.
+    It uses the Levenberg-Marquardt method.
     """
     found, damping = np.array(FIRST), 1e-3
     rows = off(found)
@@ -190,12 +200,12 @@ def _least(off: Callable[[Array], Array]) -> Array:
 
 
 def _response(given: Array, seen: Array, frequency: float) -> tuple[float, float]:
-    """Return gain and phase, degrees, of a chirp's answer about a frequency, Hz."""
+    """Return gain and phase, deg, of the response to a chirp near a frequency, Hz."""
     first, last = CHIRP
     growth = np.log(last / first) / CHIRP_SECONDS
     middle = np.log(frequency / first) / growth
     times = GRID * np.arange(len(given))
-    # Half an octave of the sweep.
+    # The window covers half an octave of the chirp.
     window = np.exp(-(((times - middle) * growth / 0.17) ** 2))
     parts = [np.gradient(rows, GRID) * window for rows in (given, seen)]
     spectra = [np.fft.rfft(part) for part in parts]

@@ -1,4 +1,4 @@
-"""Session: the steps of a calibration that every camera needs, in any order."""
+"""Session: the steps of a calibration that are common to all cameras."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ from marl_airhockey.devices.vision.lens import Lens, View
 from marl_airhockey.types import Array
 
 PADDLE_TOP = 0.06
-"""Height of the middle of what is seen of a paddle from above, m"""
+"""Height of the centre of a paddle's outline from above, m"""
 AVERAGED = 6
-"""Pictures over which corners and places are averaged"""
+"""Number of frames over which corners and positions are averaged"""
 
 Needed = TypeVar("Needed")
 
 
 @dataclass
 class FoundByCamera:
-    """What a calibration has found so far by a camera alone."""
+    """Results so far of the steps that need only a camera."""
 
     boards: list[tuple[Array, Array]] = field(default_factory=list)
-    """Corners of the board and their numbers, in each picture that was taken"""
+    """Corners of the board and their numbers, for each taken picture"""
     lens: Lens | None = None
     corners: list[tuple[float, float]] = field(default_factory=list)
     """Clicked corners of the field, px, in the order of `Table.vertices`"""
     view: View | None = None
     tags: dict[int, Array] = field(default_factory=dict)
-    """Corners (4, 2) of the tags by number, field's frame, m"""
+    """Corners (4, 2) of the tags by number, field frame, m"""
     paddle: Colour | None = None
 
 
@@ -54,12 +54,12 @@ class CameraSession:
     """Session of a calibration of one camera over one field.
 
     Args:
-        camera: that looks at the field.
-        corners: (n, 2) of the field, counter-clockwise, m.
-        radius: of the paddle that is moved on it, m.
-        path: where the rig is written.
-        measured: corners (4, 2) of tags whose places were measured, by number, field's
-            frame, m; without these the field's edges say where it lies.
+        camera: Open camera over the field.
+        corners: (n, 2) corners of the field, counter-clockwise, field frame, m.
+        radius: Radius of the paddle on the field, m.
+        path: Path of the rig's file.
+        measured: Measured corners (4, 2) of tags by number, field frame, m; None to
+            find the view by the field's edges.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class CameraSession:
         self._busy = threading.Lock()
         self.found = FoundByCamera()
         self.saved = ""
-        """Path of the file that was written; "" before."""
+        """Path of the written file; "" before."""
         self.orders: dict[str, Callable[..., None]] = {
             "board": self.take_board,
             "lens": self.solve_lens,
@@ -85,13 +85,18 @@ class CameraSession:
             "paddle": self.click_paddle,
             "save": self.save,
         }
-        """What can be asked for, by name"""
+        """Functions of the orders, by name"""
 
     def do(self, order: str, x: float = 0.0, y: float = 0.0) -> None:
-        """Do what a page asks for, by a name of `orders`; a click has a place, px.
+        """Carry out an order.
+
+        Args:
+            order: Name of the order, see `orders`.
+            x: Column of a click, px.
+            y: Row of a click, px.
 
         Raises:
-            ValueError: an unknown order, or one that cannot be done, and why.
+            ValueError: The order is unknown, or cannot be carried out.
         """
         if order not in self.orders:
             raise ValueError(f"{order!r}: there are {', '.join(self.orders)}")
@@ -104,10 +109,16 @@ class CameraSession:
     # Steps.
 
     def take_board(self) -> None:
-        """Take a picture of the ChArUco board."""
+        """Take a picture of the ChArUco board.
+
+        Raises:
+            ValueError: Too few corners of the board are seen.
+        """
         seen = find_board(self._frame().image)
         if seen is None:
-            raise ValueError("the board is not seen: nearer, brighter, less tilted?")
+            raise ValueError(
+                "the board is not seen; hold it nearer or less tilted, or add light"
+            )
         self.found.boards.append(seen)
 
     def solve_lens(self) -> None:
@@ -118,7 +129,7 @@ class CameraSession:
     def click_corner(self, x: float, y: float) -> None:
         """Take a click on the next corner of the table."""
         if len(self.found.corners) == len(self._corners):
-            raise ValueError("all corners are clicked; clear them to begin anew")
+            raise ValueError("all corners are clicked; clear them to click again")
         self.found.corners.append((x, y))
 
     def clear_corners(self) -> None:
@@ -126,7 +137,7 @@ class CameraSession:
         self.found.corners.clear()
 
     def solve_table(self) -> None:
-        """Find where the camera is, and where the tags are."""
+        """Find the camera's view and the corners of the tags."""
         lens = need(self.found.lens, "the lens")
         images = [frame.image for frame in self._frames(AVERAGED)]
         seen = [find_tags(image) for image in images]
@@ -145,7 +156,7 @@ class CameraSession:
         self.found.tags = {k: view.to_table(four) for k, four in tags.items()}
 
     def click_paddle(self, x: float, y: float) -> None:
-        """Take the paddle's colour from where it is clicked."""
+        """Take the paddle's colour from a clicked pixel."""
         self.found.paddle = Colour.around(self._frame().image, (x, y))
 
     def save(self) -> None:
@@ -156,10 +167,10 @@ class CameraSession:
     def _write(self) -> None:
         raise NotImplementedError
 
-    # What a page shows.
+    # State for the page.
 
     def state(self) -> dict[str, Any]:
-        """Return what has been found, for people: lengths in mm, errors in px."""
+        """Return the results so far for the page: lengths in mm, errors in px."""
         found = self.found
         return {
             "boards": len(found.boards),
@@ -175,10 +186,14 @@ class CameraSession:
         }
 
     def picture(self) -> bytes:
-        """Return the newest picture, a JPEG with what is found drawn over it."""
+        """Return the newest frame as JPEG, with the results drawn over it.
+
+        Raises:
+            RuntimeError: There is no frame yet.
+        """
         frame = self._camera.newest
         if frame is None:
-            raise RuntimeError(self._camera.trouble or "camera: no picture yet")
+            raise RuntimeError(self._camera.trouble or "camera: no frame yet")
         image, found = frame.image.copy(), self.found
         for four in find_tags(image).values():
             _outline(image, four, (0, 200, 0))
@@ -197,7 +212,7 @@ class CameraSession:
     # Devices.
 
     def _detectors(self) -> list[Detector]:
-        """Return those of all that has been clicked."""
+        """Return the detectors of all clicked objects."""
         return [] if self.found.paddle is None else [self._paddle_detector()]
 
     def _detector(self, colour: Colour, radius: float, height: float) -> Detector:
@@ -213,10 +228,10 @@ class CameraSession:
         return self._frames(1)[0]
 
     def _frames(self, count: int) -> list[Frame]:
-        """Return the next pictures.
+        """Return the next frames.
 
         Raises:
-            ValueError: none come.
+            ValueError: No frames arrive.
         """
         newest = self._camera.newest
         frames: list[Frame] = []
@@ -224,16 +239,20 @@ class CameraSession:
             last = frames[-1] if frames else newest
             frame = self._camera.next(last.number if last else -1)
             if frame is None:
-                raise ValueError(self._camera.trouble or "camera: no pictures")
+                raise ValueError(self._camera.trouble or "camera: no frames")
             frames.append(frame)
         return frames
 
 
 def need(what: Needed | None, name: str) -> Needed:
-    """Return what has to be there.
+    """Return a result of an earlier step.
+
+    Args:
+        what: Result; None before that step.
+        name: Name of the result, for messages.
 
     Raises:
-        ValueError: it is not, by its name.
+        ValueError: The result is missing.
     """
     if what is None:
         raise ValueError(f"{name} comes first")

@@ -1,8 +1,8 @@
-"""Delay: how late pictures come, and how late the arm, by the arm's own motion.
+"""Delay: latency of the camera and of the arm, measured by a motion of the arm.
 
-The arm goes to and fro; the camera sees it. The time by which what is seen has to be
-shifted to lie on what the arm reported, or on what it was sent, is a delay. Pictures
-count from when they are here, all times are of one clock, and no clocks are compared.
+The arm moves back and forth under the camera. The time shift between the seen motion
+and the reported one, or the sent one, is a delay. A frame counts from its arrival. All
+times are of one clock.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from marl_airhockey.lab.calibration.motion import lead
 from marl_airhockey.types import Array
 
 AMPLITUDE, PERIOD = 0.09, 1.0
-"""Half of the way to and fro, m, and its time, s"""
+"""Amplitude, m, and period, s, of the motion"""
 WINDOW = 1.0
 """Time of a trial, s"""
 LEAST_SEEN = 8
-"""Pictures with the paddle that a trial needs"""
+"""Least number of frames with the paddle in a trial"""
 LONGEST, STEP = 0.4, 0.002
-"""Largest delay that is looked for, and the step in which it is, s"""
+"""Largest delay of the search, and its step, s"""
 SETTLE = 1.0
-"""Time for which the motion goes on before it is measured, s"""
+"""Time of the motion before the first trial, s"""
 
 
 @dataclass(frozen=True)
@@ -40,22 +40,22 @@ class Delays:
     """Delays of n trials, s."""
 
     camera: Array
-    """(n,) from when the paddle was somewhere until a picture of that is here"""
+    """(n,) from a position of the paddle until its frame has arrived"""
     arm: Array
-    """(n,) from when it was sent somewhere until it is there"""
+    """(n,) from a commanded position until the arm has reached it"""
 
     @property
     def round_trip(self) -> Array:
-        """(n,) from a command's effect being sent until it is seen."""
+        """(n,) from a commanded position until its frame has arrived, s."""
         return self.camera + self.arm
 
 
 class Watch(threading.Thread):
-    """Thread that notes when pictures came, and where the paddle is in them.
+    """Thread that records the arrival of frames and the paddle's position in them.
 
     Args:
-        camera: that is open.
-        detector: of the paddle.
+        camera: Open camera.
+        detector: Detector of the paddle.
     """
 
     def __init__(self, camera: Camera, detector: Detector) -> None:
@@ -63,10 +63,10 @@ class Watch(threading.Thread):
         self._camera, self._detector = camera, detector
         self._ended = threading.Event()
         self.rows: list[tuple[float, float, float]] = []
-        """Time at which a picture was here, s, and x and y, m"""
+        """Arrival time of a frame, s, and x and y of the paddle, m"""
 
     def run(self) -> None:
-        """Look at all pictures until `stop`."""
+        """Search all frames until `stop`."""
         number = -1
         while not self._ended.is_set():
             frame = self._camera.next(number, 0.2)
@@ -87,20 +87,20 @@ class Watch(threading.Thread):
 def measure_delays(
     rig: Rig, trials: int, tell: Callable[[int], None] = lambda done: None
 ) -> Delays:
-    """Move the arm to and fro and return the delays.
+    """Move the arm back and forth and return the delays.
 
     Args:
-        rig: of the table.
-        trials: number of them, each of `WINDOW`.
-        tell: called with the number of trials that are done.
+        rig: Rig of the table.
+        trials: Number of trials, each of `WINDOW` seconds.
+        tell: Function that is called with the number of finished trials.
 
     Raises:
-        ValueError: the rig does not know the paddle's colour.
-        RuntimeError: the arm stops, or the paddle is not seen.
+        ValueError: The rig has no colour of the paddle.
+        RuntimeError: The arm stops, or the paddle is not seen.
     """
     if rig.paddle is None:
         raise ValueError(
-            "the rig does not know the paddle's colour: calibrate anew, and click it"
+            "the rig has no paddle's colour; calibrate again, and click the paddle"
         )
     table = TABLES[rig.table]
     reach = make_seat("robot", table, 0).reach
@@ -128,22 +128,26 @@ def measure_delays(
     good = np.array([pair for pair in found if pair is not None]).reshape(-1, 2)
     if len(good) < trials / 2:
         raise RuntimeError(
-            f"the paddle was seen well enough in {len(good)} of {trials} trials alone"
+            f"the paddle was seen in only {len(good)} of {trials} trials; check the "
+            "light, its colour in the rig, and what hides it"
         )
     return Delays(good[:, 0], good[:, 1] - good[:, 0])
 
 
 def _sway(now: float) -> tuple[Array, Array]:
-    """Return place, m, and velocity, m/s, of the motion to and fro."""
+    """Return offset (2,), m, and velocity (2,), m/s, of the motion at a time, s."""
     rate = 2 * np.pi / PERIOD
-    place = np.array([0.0, AMPLITUDE * np.sin(rate * now)])
-    return place, np.array([0.0, AMPLITUDE * rate * np.cos(rate * now)])
+    offset = np.array([0.0, AMPLITUDE * np.sin(rate * now)])
+    return offset, np.array([0.0, AMPLITUDE * rate * np.cos(rate * now)])
 
 
 def _trial(
     seen: Array, reported: Array, sent: Array, start: float
 ) -> tuple[float, float] | None:
-    """Return the delay of what is seen behind what was reported, and was sent, s."""
+    """Return the delays of the seen motion to the reported and the sent one, s.
+
+    Return None if the paddle is seen in too few frames.
+    """
     inside = (seen[:, 0] >= start) & (seen[:, 0] < start + WINDOW)
     if inside.sum() < LEAST_SEEN:
         return None
@@ -151,23 +155,23 @@ def _trial(
 
 
 def find_delay(late: Array, early: Array) -> float:
-    """Return the time by which a motion is behind another one, s.
+    """Return the delay of a motion to another one, s.
 
-    A constant distance between them does not count.
+    A constant offset between their positions is ignored.
 
     Args:
-        late: (n, 3) time, s, and place, m.
-        early: (m, 3) the same, over a longer time.
+        late: (n, 3) time, s, and position, m, of the delayed motion.
+        early: (m, 3) the same of the other motion, over a longer time.
     """
     tried = np.arange(0.0, LONGEST, STEP)
     misfit = np.empty(len(tried))
     for k, delay in enumerate(tried):
         times = late[:, 0] - delay
-        places = [np.interp(times, early[:, 0], early[:, axis]) for axis in (1, 2)]
-        off = late[:, 1:] - np.stack(places, 1)
+        shifted = [np.interp(times, early[:, 0], early[:, axis]) for axis in (1, 2)]
+        off = late[:, 1:] - np.stack(shifted, 1)
         misfit[k] = np.square(off - off.mean(0)).sum()
     k = int(np.clip(np.argmin(misfit), 1, len(tried) - 2))
-    # The least of the parabola through the three best.
+    # The minimum of a parabola through the best delay and its neighbours.
     before, at, after = misfit[k - 1 : k + 2]
     bend = before - 2 * at + after
     inner = 0.5 * (before - after) / bend if bend > 0 else 0.0

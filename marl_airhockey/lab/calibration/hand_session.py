@@ -1,4 +1,4 @@
-"""Session of a hand: a camera over the field on which a person moves a paddle."""
+"""Session of a hand: calibration of a camera above the field of a person's paddle."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class HandSession(CameraSession):
     """Session of a calibration of one camera over the field of a hand.
 
     Args:
-        camera: that looks at the field.
-        source: of its pictures, see `open_source`.
-        size: (2,) length, away from the person, and width of the field, m.
-        path: where the rig is written.
-        measured: see `CameraSession`.
+        camera: Open camera over the field.
+        source: Source of its frames, see `open_source`.
+        size: Length, away from the person, and width of the field, m.
+        path: Path of the rig's file.
+        measured: Measured corners of tags, see `CameraSession`.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Helper: the virtual lab's own person, who does what a calibration asks for."""
+"""Helper: does the manual steps of a calibration in the virtual lab."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from marl_airhockey.core.table import TABLES
 from marl_airhockey.lab.lab import LabClient
 
 GUIDED = 4.0
-"""Longest time in which the arm is at the next place, s"""
+"""Longest time until the arm has reached the next position, s"""
 PUCK = (0.3, 0.0)
-"""Place at which the puck lies meanwhile, m"""
+"""Position of the puck during the calibration, table frame, m"""
 
 
 class HandHelper:
-    """Helper in a running lab who is the hand.
+    """Helper for the calibration of a hand in a running lab.
 
     Args:
-        client: of the lab.
+        client: Client of the lab.
     """
 
     def __init__(self, client: LabClient) -> None:
         self._client, self._boards = client, 0
         self.source = f"stream:{client.ask('hand', middle=[0.0, 0.0])['camera']}"
-        """Source of the pictures of the hand's camera"""
+        """Source of the frames of the hand's camera"""
         self.orders: dict[str, Callable[..., None]] = {
             "show_board": self.show_board,
             "board_away": self.put_board_away,
         }
-        """What can be asked for, by name"""
+        """Functions of the orders, by name"""
 
     def show_board(self) -> None:
-        """Hold the board before the camera in another way."""
+        """Show the board to the camera in the next pose."""
         self._client.ask("hand_board", number=self._boards)
         self._boards += 1
         time.sleep(0.3)
@@ -47,10 +47,10 @@ class HandHelper:
 
 
 class Helper:
-    """Helper in a running lab.
+    """Helper for the calibration of a table in a running lab.
 
     Args:
-        client: of the lab.
+        client: Client of the lab.
     """
 
     def __init__(self, client: LabClient) -> None:
@@ -59,7 +59,7 @@ class Helper:
         reach = np.array(make_seat("robot", table, 0).reach)
         middle = reach.mean(0)
         inner = middle + 0.9 * (reach - middle)
-        self._places = np.concatenate(
+        self._positions = np.concatenate(
             [[middle], inner, middle + 0.5 * (inner - middle)]
         )
         client.ask("place", puck=list(PUCK), velocity=[0.0, 0.0])
@@ -67,24 +67,24 @@ class Helper:
             "show_board": self.show_board,
             "guide": self.guide,
         }
-        """What can be asked for, by name"""
+        """Functions of the orders, by name"""
 
     def show_board(self) -> None:
-        """Hold the board before the camera in another way."""
+        """Show the board to the camera in the next pose."""
         self._client.ask("board", number=self._boards)
         self._boards += 1
         time.sleep(0.3)
 
     def guide(self) -> None:
-        """Put the board away and let the paddle stand at the next place."""
+        """Put the board away and move the paddle to its next position."""
         self._client.ask("board", number=None)
-        place = self._places[self._guided % len(self._places)]
+        target = self._positions[self._guided % len(self._positions)]
         self._guided += 1
-        self._client.ask("guide", place=place.tolist())
+        self._client.ask("guide", place=target.tolist())
         until = time.monotonic() + GUIDED
         while time.monotonic() < until:
             truth = np.array(self._client.ask("truth")["paddle"])
-            if np.linalg.norm(truth[:2] - place) < 1e-3:
+            if np.linalg.norm(truth[:2] - target) < 1e-3:
                 break
             time.sleep(0.05)
         time.sleep(0.4)

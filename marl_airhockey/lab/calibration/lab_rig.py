@@ -1,7 +1,6 @@
-"""Calibration of the lab's rig, as it is done at a real table.
+"""Calibration of the lab's rig, as at a real table.
 
-Nothing is known that could not be measured there, but for the lens, which is the
-maker's.
+It uses only values that could be measured at a real table, except for the lens.
 """
 
 from __future__ import annotations
@@ -34,26 +33,29 @@ from marl_airhockey.lab.table_camera import lab_view, tag_places
 from marl_airhockey.types import Array
 
 PICTURES = 8
-"""Pictures over which the corners of tags are averaged"""
+"""Number of frames over which the corners of tags are averaged"""
 CLICKED = np.array([[0.3, 0.0, 0.003]])
-"""Place at which the puck lies while its colour is clicked, m"""
+"""(1, 3) position of the puck while its colour is clicked, table frame, m"""
 RIM, DIRECTIONS = 0.034, 16
-"""Distance from the middle of the arm's paddle to where it may be clicked, m, and the
-number of directions: wherever the arm stands, it leaves some of them free"""
+"""Distance of possible clicks from the centre of the arm's paddle, m, and number of
+their directions; the arm never hides all of them"""
 REACH = 3
-"""Distance from a click up to which the colour of the paddle counts, px: the arm may
-leave no more of it free"""
+"""Radius around a click in which the colour of the paddle is taken, px; a larger part
+may be hidden by the arm"""
 GRIPPED = np.array([[0.028, 0.0, PADDLE_TOP]])
-"""Place at which the hand's paddle is clicked, m"""
+"""(1, 3) position of the click on the hand's paddle, field frame, m"""
 
 
 def calibrate_lab(client: LabClient) -> Rig:
     """Return the rig of a lab.
 
+    Args:
+        client: Client of the lab.
+
     Raises:
-        RuntimeError: the lab has ended.
-        CameraError: it shows no pictures.
-        ValueError: what is seen does not fit together.
+        RuntimeError: The lab has ended.
+        CameraError: The lab sends no frames.
+        ValueError: Tags or colours are not seen as expected.
     """
     info, survey = client.ask("info"), client.ask("survey")
     table = TABLES[info["table"]]
@@ -64,7 +66,7 @@ def calibrate_lab(client: LabClient) -> Rig:
     with Camera(open_source(source)) as camera:
         frames = _take(camera, PICTURES)
     view = view_from_tags(_steady_tags(frames), known, lab_view(table).lens)
-    # What a person would click: the puck, and what the arm leaves free of its paddle.
+    # A person would click the puck, and a visible part of the paddle.
     x, y = view.project(CLICKED)[0]
     u, v = _most_coloured(frames[-1].image, view.project(_rim(client)))
     touched = (survey[name] for name in ("places", "touched", "tool"))
@@ -83,17 +85,17 @@ def calibrate_lab(client: LabClient) -> Rig:
 
 
 def _rim(client: LabClient) -> Array:
-    """Return places (n, 3) on the arm's paddle that the arm may hide, m."""
+    """Return points (n, 3) on the arm's paddle, some of them hidden, table frame, m."""
     angles = np.linspace(0.0, 2 * np.pi, DIRECTIONS, endpoint=False)
-    way = RIM * np.stack([np.cos(angles), np.sin(angles)], 1)
-    places = np.array(client.ask("truth")["paddle"][:2]) + way
-    return np.column_stack([places, np.full(len(places), PADDLE_TOP)])
+    offsets = RIM * np.stack([np.cos(angles), np.sin(angles)], 1)
+    points = np.array(client.ask("truth")["paddle"][:2]) + offsets
+    return np.column_stack([points, np.full(len(points), PADDLE_TOP)])
 
 
 def _most_coloured(image: Array, pixels: Array) -> Array:
     """Return the pixel of (n, 2) whose neighbourhood has the highest least saturation.
 
-    A mean would prefer a vivid neighbourhood that a shadow or the arm's edge crosses.
+    A mean could prefer a neighbourhood that contains a shadow or the arm's edge.
     """
     saturation = cv2.medianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2HSV), 3)[..., 1]
     least = cv2.erode(saturation, np.ones((2 * REACH + 1, 2 * REACH + 1), np.uint8))
@@ -104,10 +106,13 @@ def _most_coloured(image: Array, pixels: Array) -> Array:
 def calibrate_hand(client: LabClient) -> HandRig:
     """Return the rig of a lab's hand.
 
+    Args:
+        client: Client of the lab.
+
     Raises:
-        RuntimeError: the lab has ended.
-        CameraError: it shows no pictures.
-        ValueError: what is seen does not fit together.
+        RuntimeError: The lab has ended.
+        CameraError: The lab sends no frames.
+        ValueError: Tags or colours are not seen as expected.
     """
     source = f"stream:{client.ask('hand', middle=[0.0, 0.0])['camera']}"
     known = {k: tag_corners(place) for k, place in hand_tag_places().items()}
@@ -126,7 +131,7 @@ def calibrate_hand(client: LabClient) -> HandRig:
 
 
 def _steady_tags(frames: list[Frame]) -> dict[int, Array]:
-    """Return the mean corners of the tags that are seen in all frames."""
+    """Return the mean corners (4, 2), px, of the tags that are seen in all frames."""
     seen = [find_tags(frame.image) for frame in frames]
     steady = set(seen[0]).intersection(*seen[1:])
     return {k: np.mean([tags[k] for tags in seen], axis=0) for k in steady}
@@ -134,12 +139,12 @@ def _steady_tags(frames: list[Frame]) -> dict[int, Array]:
 
 @contextmanager
 def running_lab() -> Iterator[LabClient]:
-    """Give a client of the lab that runs on this machine.
+    """Yield a client of the lab that runs on this machine.
 
-    If none runs, one is started, and ended at the end.
+    Without a running lab, one is started and closed at the end.
 
     Raises:
-        RuntimeError: it does not start.
+        RuntimeError: The lab does not start.
     """
     with ExitStack() as stack:
         client = LabClient.find()
@@ -152,10 +157,10 @@ def running_lab() -> Iterator[LabClient]:
 
 @contextmanager
 def lab_rig() -> Iterator[Path]:
-    """Give the file of the rig of the `running_lab`.
+    """Yield the rig's file of the `running_lab`.
 
     Raises:
-        RuntimeError: it does not start.
+        RuntimeError: The lab does not start.
     """
     with running_lab() as client:
         path = cache_folder() / f"lab-{client.port}.json"
@@ -165,10 +170,10 @@ def lab_rig() -> Iterator[Path]:
 
 @contextmanager
 def hand_rig() -> Iterator[Path]:
-    """Give the file of the rig of the hand in the `running_lab`.
+    """Yield the rig's file of the hand in the `running_lab`.
 
     Raises:
-        RuntimeError: it does not start.
+        RuntimeError: The lab does not start.
     """
     with running_lab() as client:
         path = cache_folder() / f"hand-{client.port}.json"

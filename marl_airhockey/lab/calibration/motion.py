@@ -1,4 +1,4 @@
-"""Motion: the arm led along a path, and what it was sent and reported meanwhile."""
+"""Motion: moves the arm along a path and records sent and reported positions."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from marl_airhockey.devices.robot import DriverState, Robot
 from marl_airhockey.types import Array
 
 PULL = 2.0
-"""Rate with which a paddle that has drifted goes back to its path, 1/s"""
+"""Gain of the feedback that brings a drifted paddle back to its path, 1/s"""
 PERIOD = 0.004
-"""Time between two commands, s: half of the driver's own"""
+"""Time between two commands, s: half of the driver's period"""
 
 
 class Motion(NamedTuple):
     """Motion of the arm; times are of the monotonic clock."""
 
     reported: Array
-    """(n, 3) time, s, and place, m, as the arm told"""
+    """(n, 3) time, s, and position, m, that the arm reported"""
     sent: Array
-    """(m, 3) time, s, and place, m, to which it was sent"""
+    """(m, 3) time, s, and position, m, that was sent to the arm"""
 
 
 def lead(
@@ -33,28 +33,28 @@ def lead(
     seconds: float,
     tell: Callable[[float], None] = lambda now: None,
 ) -> Motion:
-    """Lead the arm along a path about a place.
+    """Move the arm along a path and return the motion.
 
     Args:
-        robot: that is connected.
-        home: (2,) m.
-        path: place from there (2,), m, and velocity (2,), m/s, by the time since the
-            beginning, s.
-        seconds: length.
-        tell: called with the time since the beginning, s.
+        robot: Connected robot.
+        home: (2,) origin of the path, table frame, m.
+        path: Function of the time since the start, s, that returns the offset (2,) from
+            home, m, and the velocity (2,), m/s.
+        seconds: Length of the motion, s.
+        tell: Function that is called with the time since the start, s.
 
     Raises:
-        RuntimeError: the arm stops.
+        RuntimeError: The arm stops.
     """
     reported: list[Array] = []
     sent: list[tuple[float, float, float]] = []
     robot.enable()
     began = time.monotonic()
     while (now := time.monotonic() - began) < seconds:
-        place, velocity = path(now)
+        offset, velocity = path(now)
         status = robot.get_observation()
-        # It stays about its path whatever commands come late.
-        drift = home + place - (status.sent_x, status.sent_y)
+        # The feedback keeps the arm near its path if commands are late.
+        drift = home + offset - (status.sent_x, status.sent_y)
         robot.send_action(velocity + PULL * drift, 0.02)
         if (
             robot.state in (DriverState.FAULT, DriverState.HOLD)
@@ -70,6 +70,6 @@ def lead(
 
 
 def _in_order(rows: Array) -> Array:
-    """Return rows by their times, each time once."""
+    """Return rows sorted by time, one row for each time."""
     _, first = np.unique(rows[:, 0], return_index=True)
     return np.asarray(rows[first])

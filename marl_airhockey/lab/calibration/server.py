@@ -1,4 +1,4 @@
-"""Server of the calibration's page: pictures out, clicks and orders in."""
+"""Server of the calibration's page: sends frames, receives clicks and orders."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from marl_airhockey.lab.calibration.camera_session import CameraSession
 
 WEB = Path(__file__).parent / "web"
 LARGEST = 512
-"""Most bytes of an order"""
+"""Largest size of an order, bytes"""
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -30,8 +30,8 @@ def application(
     """Return the web application of a calibration.
 
     Args:
-        session: that does the work.
-        refusal: returns the reason to refuse a request; None to accept it.
+        session: Session that carries out the orders.
+        refusal: Function that returns the reason to refuse a request; None to accept.
     """
 
     async def page(request: Request) -> Response:
@@ -57,11 +57,11 @@ def application(
         if refused is not None:
             return refused
         if int(request.headers.get("content-length", LARGEST + 1)) > LARGEST:
-            return PlainTextResponse("an order is shorter\n", 413)
+            return PlainTextResponse(f"an order has at most {LARGEST} bytes\n", 413)
         try:
             given = await request.json()
-            order, place = str(given.pop("do")), {k: float(v) for k, v in given.items()}
-            await asyncio.to_thread(session.do, order, **place)
+            order, click = str(given.pop("do")), {k: float(v) for k, v in given.items()}
+            await asyncio.to_thread(session.do, order, **click)
         except (ValueError, RuntimeError, KeyError, TypeError, AttributeError) as error:
             return JSONResponse({"error": str(error)}, 400)
         return JSONResponse(session.state())

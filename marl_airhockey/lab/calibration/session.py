@@ -1,4 +1,4 @@
-"""Session of a table: camera, puck, and the arm that stands at it."""
+"""Session of a table: calibration of its camera, its puck and its arm."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from marl_airhockey.lab.calibration.camera_session import (
 from marl_airhockey.types import Array
 
 TOUCHES = 9
-"""Least number of places at which the paddle stands on the table"""
+"""Least number of positions at which the paddle touches the table"""
 LOOSE = 0.005
-"""Error of the robot's fit, m, beyond which it is refused"""
+"""Largest accepted error of the robot's fit, m"""
 
 
 @dataclass
 class Found(FoundByCamera):
-    """What a calibration of a table has found so far."""
+    """Results of a table's calibration so far."""
 
     puck: Colour | None = None
     places: list[Array] = field(default_factory=list)
-    """Places (2,) at which the paddle stood, m"""
+    """Positions (2,) of the paddle on the table, table frame, m"""
     poses: list[Array] = field(default_factory=list)
-    """Poses (6,) of the arm's tool there, base frame"""
+    """Poses (6,) of the arm's tool at these positions, base frame, m and rad"""
     mounting: Mounting | None = None
 
 
@@ -45,12 +45,13 @@ class CalibrationSession(CameraSession):
     """Session of a calibration of one camera, one table and one arm.
 
     Args:
-        camera: that looks at the table.
-        read_pose: returns the pose (6,) of the arm's tool, base frame.
-        rig: fields of the `Rig` that are not measured, by name: table, camera, robot.
-        path: where the rig is written.
-        measured: corners (4, 2) of tags whose places were measured, by number, table
-            frame, m; without these the table's edges say where it lies.
+        camera: Open camera over the table.
+        read_pose: Function that returns the pose (6,) of the arm's tool, base frame, m
+            and rad.
+        rig: Fields of the `Rig` that are not measured, by name: table, camera, robot.
+        path: Path of the rig's file.
+        measured: Measured corners (4, 2) of tags by number, table frame, m; None to
+            find the view by the table's edges.
     """
 
     def __init__(
@@ -73,30 +74,40 @@ class CalibrationSession(CameraSession):
         }
 
     def click_puck(self, x: float, y: float) -> None:
-        """Take the puck's colour from where it is clicked."""
+        """Take the puck's colour from a clicked pixel."""
         self.found.puck = Colour.around(self._frame().image, (x, y))
 
     def touch(self) -> None:
-        """Note where the paddle stands, as the camera sees it and the arm tells."""
+        """Add the paddle's position, seen by the camera and reported by the arm.
+
+        Raises:
+            ValueError: The paddle is not seen, or the arm moves.
+        """
         detector = self._paddle_detector()
         before = np.asarray(self._read_pose())
         sightings = [detector.find(frame) for frame in self._frames(AVERAGED)]
         after = np.asarray(self._read_pose())
-        places = [seen.place for seen in sightings if seen is not None]
-        if len(places) < AVERAGED // 2:
-            raise ValueError("the paddle is not seen there: too much of it is hidden")
+        positions = [seen.place for seen in sightings if seen is not None]
+        if len(positions) < AVERAGED // 2:
+            raise ValueError(
+                "the paddle is not seen at this position; move it where less is hidden"
+            )
         if np.linalg.norm(after[:3] - before[:3]) > 0.0005:
-            raise ValueError("the arm moves: let it rest, then take the place")
-        self.found.places.append(np.median(places, axis=0))
+            raise ValueError("the arm moves; let it rest, then take the place")
+        self.found.places.append(np.median(positions, axis=0))
         self.found.poses.append(after)
 
     def solve_robot(self) -> None:
-        """Find where the table lies in the frame of the arm's base."""
+        """Find the table's pose in the arm's base frame.
+
+        Raises:
+            ValueError: Too few positions, or positions that no pose fits.
+        """
         found = self.found
         if len(found.places) < TOUCHES:
             raise ValueError(
-                f"{len(found.places)} places: let the paddle stand at {TOUCHES} or "
-                "more, all over its reach"
+                f"{len(found.places)} places: put the paddle on the table at {TOUCHES} "
+                "or more, all over its reach"
             )
         poses = np.array(found.poses)
         mounting = fit_mounting(
@@ -105,8 +116,8 @@ class CalibrationSession(CameraSession):
         if mounting.residual > LOOSE:
             raise ValueError(
                 f"the places fit to {1e3 * mounting.residual:.1f} mm, "
-                f"{1e3 * LOOSE:.0f} mm is allowed: did the paddle stand flat, and is "
-                "the tool's centre set to its foot?"
+                f"{1e3 * LOOSE:.0f} mm is allowed; put the paddle flat on the table, "
+                "and set the tool's centre to its foot"
             )
         found.mounting = mounting
 

@@ -1,4 +1,4 @@
-"""Sheets: the printed tags and the ChArUco board, as PDF files for A4 paper."""
+"""Sheets: printable tags and ChArUco board, as PDF files for A4 paper."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from marl_airhockey.devices.vision.calibration import TAG, TAGS
 from marl_airhockey.types import Array
 
 DPI = 300
-"""Pixels of an inch"""
+"""Resolution, pixels per inch"""
 PAGE = (0.210, 0.297)
 """Width and height of a sheet, m"""
 COUNT, EACH = 8, 4
-"""Number of tags, and of those on one sheet"""
+"""Number of tags, and number of tags on one sheet"""
 RULER = 0.1
-"""Length of the line by which the scale of a print is checked, m"""
+"""Length of the line for a check of a print's scale, m"""
 
 
 def _pixels(metres: float) -> int:
@@ -27,36 +27,36 @@ def _pixels(metres: float) -> int:
 
 
 def _page() -> Image.Image:
-    """Return an empty sheet with its ruler."""
+    """Return an empty sheet with a ruler."""
     page = Image.new("L", (_pixels(PAGE[0]), _pixels(PAGE[1])), 255)
     pen = ImageDraw.Draw(page)
     x, y = _pixels(0.02), _pixels(PAGE[1] - 0.012)
     pen.line((x, y, x + _pixels(RULER), y), 0, 4)
     for end in (x, x + _pixels(RULER)):
         pen.line((end, y - 20, end, y + 20), 0, 4)
-    words = f"{1e3 * RULER:.0f} mm: if not, print at 100 % scale"
-    pen.text((x + _pixels(RULER) + 30, y - 24), words, 0, font_size=40)
+    note = f"must be {1e3 * RULER:.0f} mm; if not, print at 100 % scale"
+    pen.text((x + _pixels(RULER) + 30, y - 24), note, 0, font_size=40)
     return page
 
 
 def _paste(page: Image.Image, image: Array, x: float, y: float, note: str) -> None:
-    """Put a picture with a note below it at a place, m from the upper left corner."""
+    """Put an image with a note below it at (x, y), m from the upper left corner."""
     page.paste(Image.fromarray(image), (_pixels(x), _pixels(y)))
-    place = _pixels(x), _pixels(y) + image.shape[0] + 30
-    ImageDraw.Draw(page).text(place, note, 0, font_size=40)
+    below = _pixels(x), _pixels(y) + image.shape[0] + 30
+    ImageDraw.Draw(page).text(below, note, 0, font_size=40)
 
 
 def write_sheets(folder: Path) -> list[Path]:
     """Write ``tags.pdf`` and ``charuco.pdf`` into a folder and return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
-    words, size = cv2.aruco.getPredefinedDictionary(TAGS), _pixels(TAG)
+    markers, size = cv2.aruco.getPredefinedDictionary(TAGS), _pixels(TAG)
     pages = []
     for first in range(0, COUNT, EACH):
         page = _page()
         for k in range(EACH):
-            tag = cv2.aruco.generateImageMarker(words, first + k, size)
-            place = 0.018 + 0.096 * (k % 2), 0.02 + 0.12 * (k // 2)
-            _paste(page, np.asarray(tag), *place, f"tag {first + k}")
+            tag = cv2.aruco.generateImageMarker(markers, first + k, size)
+            corner = 0.018 + 0.096 * (k % 2), 0.02 + 0.12 * (k // 2)
+            _paste(page, np.asarray(tag), *corner, f"tag {first + k}")
         pages.append(page)
     tags = folder / "tags.pdf"
     pages[0].save(tags, resolution=DPI, save_all=True, append_images=pages[1:])
