@@ -19,7 +19,7 @@ from marl_airhockey.registry import find_backend
 from marl_airhockey.world.build import Keywords
 
 GAME, PLAYER = "juggle", "zoo/juggle"
-"""What is played in the demo, and who plays"""
+"""Scenario and player of the demo"""
 
 lab = typer.Typer(help="The virtual lab: a table, a camera and a UR5e over a network.")
 

@@ -142,13 +142,13 @@ class Backend(ABC):
         self._before = state
 
     @classmethod
-    def table_of(cls, rig: str) -> tuple[str, str] | None:
-        """Return the names of the table of a rig and of its robot's profile.
+    def table_and_profile(cls, rig: str) -> tuple[str, str] | None:
+        """Return the names of a rig's table and of its robot's profile.
 
-        None for a simulation.
+        A simulation returns None.
 
         Raises:
-            ValueError: The file is wrong.
+            ValueError: The file cannot be read.
         """
         return None
 

@@ -152,21 +152,24 @@ def build_driven_world(
 
 
 def table_keywords(keywords: Keywords) -> Keywords:
-    """Return keywords with what the rig of a real table says: its size and profile.
+    """Return keywords with the table and the profile of a real table's rig.
 
-    Those that are given stay, as do all of a simulation.
+    Those that are given stay, but for the profile "ideal", which no real table has.
+    Keywords of a simulation are returned as they are.
 
     Raises:
         ValueError: A rig that cannot be read.
     """
     backend = find_backend(keywords.get("backend", DEFAULT_BACKEND))
     rig = keywords.get("rig", "")
-    known = backend.table_of(rig) if rig else None
+    known = backend.table_and_profile(rig) if rig else None
     if known is None:
         return keywords
     table, profile = known
     options = {"table": table, **keywords.get("options", {})}
-    return {"profile": profile, **keywords, "options": options}
+    given = keywords.get("profile", "ideal")
+    used = profile if given == "ideal" else given
+    return {**keywords, "profile": used, "options": options}
 
 
 def _backend(

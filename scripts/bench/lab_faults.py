@@ -6,7 +6,8 @@ The learned juggler plays through camera and arm; after a second one or two faul
 switched on. Printed are the reason with which the episode ends, the time until then and
 until the true paddle rests for good (below 0.01 m/s), and how far it moved on after the
 episode's end. "plays on" is for what ends no episode within the time that is listened.
-It takes about 25 minutes, in real time: nothing else should run meanwhile.
+It takes about 25 minutes, with ``--alone`` four, in real time: nothing else should run
+meanwhile.
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ BEFORE, LISTEN = 20, 80
 """Control steps before a fault, and the most after it"""
 REST = 2.0
 """Longest time for which an ended episode's paddle is listened to, s"""
+SETTLE = 1.0
+"""Time after the end of a fault until the next episode, in which a lifted paddle comes
+down, s"""
 STILL = 0.01
 """Speed below which the paddle rests, m/s"""
 QUIET = "local_control"
@@ -85,9 +89,10 @@ def play(lab: Lab, world: World, faults: tuple[str, ...], seed: int) -> Outcome 
         rows.append(paddle_of(lab))
         time.sleep(0.005)
     track = np.array(rows)
-    moving = track[np.hypot(track[:, 3], track[:, 4]) > STILL, 0]
-    rests = reason and moving.size and moving[-1] < track[-1, 0]
-    rest = max(moving[-1] - begin, 0.0) if rests else np.nan
+    moving = np.flatnonzero(np.hypot(track[:, 3], track[:, 4]) > STILL)
+    rested = moving[-1] + 1 if moving.size else 0
+    rests = reason and rested < len(track)
+    rest = float(track[rested, 0]) - begin if rests else np.nan
     moved = float(np.linalg.norm(track[-1, 1:3] - end[1:3])) if reason else np.nan
     return Outcome(reason, ended, rest, moved)
 
@@ -103,6 +108,7 @@ def measure(
         finally:
             for name in faults:
                 lab.ask({"do": "fault", "name": name, "on": False})
+            time.sleep(SETTLE)
     row: dict[str, object] = {"faults": " + ".join(faults), "reason": outcome.reason}
     numbers = outcome._asdict()
     del numbers["reason"]

@@ -21,7 +21,7 @@ import matplotlib as mpl
 import numpy as np
 import typer
 
-from marl_airhockey.devices.robot import DriverConfig, Robot, Smoothing
+from marl_airhockey.devices.robot import FILTERS, DriverConfig, Robot, Smoothing
 from marl_airhockey.lab.emulated_robot import EmulatedRobot
 from marl_airhockey.lab.lab import Lab
 from marl_airhockey.types import Array
@@ -33,13 +33,6 @@ SPEED, RADIUS = 0.7, 0.12
 CONTROL_DT = 0.05
 RAMP, SECONDS = 1.0, 8.0
 """Time in which the circle comes to its speed, and time of all, s"""
-FILTERS = (
-    Smoothing("none", 0.0),
-    Smoothing("low_pass", 0.05),
-    Smoothing("jerk_limited", 0.05),
-    Smoothing("minimum_jerk", 0.0),
-    Smoothing("minimum_jerk", 0.05),
-)
 
 
 class Record(NamedTuple):
@@ -159,26 +152,26 @@ def main(
 ) -> None:
     """Measure every filter in emulated and in real time, and print a table."""
     rows = []
-    print("| filter | time, s | clock | latency, ms | error, mm (RMS / largest) |")
-    print("| --- | --- | --- | --- | --- |")
+    print("| filter | clock | latency, ms | error, mm (RMS / largest) |")
+    print("| --- | --- | --- | --- |")
     with Lab() as lab:
         for clock in ("emulated", "real"):
-            for smoothing in FILTERS:
+            for smoothing in map(Smoothing, FILTERS):
                 record = (
                     in_emulated_time(smoothing)
                     if clock == "emulated"
                     else in_real_time(lab, smoothing)
                 )
                 latency, error, largest = judge(record)
-                if plot and clock == "real" and smoothing == FILTERS[0]:
+                if plot and clock == "real" and smoothing.name == "none":
                     draw(record, latency, plot)
-                case = smoothing.name, f"{smoothing.time:g}", clock
+                case = smoothing.name, clock
                 found = f"{1e3 * latency:.0f}", f"{1e3 * error:.1f}"
                 rows.append((*case, *found, f"{1e3 * largest:.1f}"))
-                print(f"| {' | '.join(rows[-1][:4])} | {' / '.join(rows[-1][4:])} |")
+                print(f"| {' | '.join(rows[-1][:3])} | {' / '.join(rows[-1][3:])} |")
     if out:
         with out.open("w", newline="") as file:
-            names = "filter", "time_s", "clock", "latency_ms", "rms_mm", "largest_mm"
+            names = "filter", "clock", "latency_ms", "rms_mm", "largest_mm"
             csv.writer(file).writerows([names, *rows])
 
 

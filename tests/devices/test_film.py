@@ -33,7 +33,7 @@ def test_a_film_has_a_time_for_each_picture(tmp_path):
     assert (np.diff(times) > 0).all()
 
 
-def test_a_film_of_two_frames_has_both(tmp_path):
+def test_a_film_of_few_frames_is_written(tmp_path):
     path = tmp_path / "a.mkv"
     with Camera(SyntheticSource(lambda now: GREY, rate=10.0)) as camera:
         reel = Film(camera, path)

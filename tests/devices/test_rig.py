@@ -12,6 +12,7 @@ from marl_airhockey.devices.vision import Colour
 from marl_airhockey.devices.vision.calibration import tag_corners
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.table_camera import lab_view, tag_places
+from marl_airhockey.world.build import table_keywords
 
 TABLE = TABLES["full_size"]
 TAGS = {str(k): tag_corners(p).tolist() for k, p in tag_places(TABLE).items()}
@@ -29,6 +30,19 @@ RIG = Rig(
 def test_it_is_the_same_after_a_file(tmp_path):
     RIG.save(tmp_path / "rig.json")
     assert Rig.load(tmp_path / "rig.json") == RIG
+
+
+@pytest.mark.parametrize(
+    ("given", "profile"), [(None, "ur5e"), ("ideal", "ur5e"), ("gantry", "gantry")]
+)
+def test_keywords_get_table_and_profile_of_the_rig(tmp_path, given, profile):
+    RIG.save(tmp_path / "rig.json")
+    keywords = {"backend": "real", "rig": str(tmp_path / "rig.json")}
+    keywords |= {} if given is None else {"profile": given}
+    found = table_keywords(keywords)
+    assert found["profile"] == profile
+    assert found["options"] == {"table": "full_size"}
+    assert table_keywords({"profile": "ideal"}) == {"profile": "ideal"}
 
 
 @pytest.mark.parametrize(

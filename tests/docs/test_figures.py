@@ -7,6 +7,9 @@ from statistics import mean
 
 import pytest
 
+from marl_airhockey.devices.rig import LATEST
+from marl_airhockey.devices.robot import MotionLimits
+
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "docs/data"
 COLUMNS = {
@@ -116,66 +119,79 @@ def test_blind_controllers_are_those_of_their_rows():
         assert row["first shot"] == rows[row["task"], "ideal"]["first_shot"]
 
 
-def pairs_of(cell):
-    """Numbers of a cell "median / worst"; none of an empty one."""
-    return [float(x) for x in cell.split("/") if x.strip()]
+STOPS = {
+    "stops.json": {
+        "driver brakes, ms": ("driver_brakes_s", 1e3, 0),
+        "a tenth slower, ms": ("slower_s", 1e3, 0),
+        "at rest, ms": ("rest_s", 1e3, 0),
+        "m/s2": ("deceleration_m_s2", 1.0, 1),
+    },
+    "stops_emulated.json": {
+        "braking begins, ms": ("begins_s", 1e3, 0),
+        "at rest, ms": ("rest_s", 1e3, 0),
+        "joint, rad/s2": ("joint_rad_s2", 1.0, 1),
+        "tool, m/s2": ("tool_m_s2", 1.0, 1),
+    },
+}
+"""Columns of the tables of stops: that of the file, its scale, and digits"""
 
 
-@pytest.mark.parametrize(
-    ("name", "key", "first", "columns"),
-    [
-        (
-            "stops.json",
-            "case",
-            "driver brakes, ms",
-            [
-                ("driver brakes, ms", "driver_brakes_s", 1e3),
-                ("a tenth slower, ms", "slower_s", 1e3),
-                ("at rest, ms", "rest_s", 1e3),
-                ("m/s2", "deceleration_m_s2", 1.0),
-            ],
-        ),
-        (
-            "stops_emulated.json",
-            "faults",
-            "braking begins, ms",
-            [
-                ("braking begins, ms", "begins_s", 1e3),
-                ("at rest, ms", "rest_s", 1e3),
-                ("joint, rad/s2", "joint_rad_s2", 1.0),
-                ("tool, m/s2", "tool_m_s2", 1.0),
-            ],
-        ),
-    ],
-)
-def test_stops_are_those_of_their_rows(name, key, first, columns):
-    rows = {row[key]: row for row in json.loads((DATA / name).read_text())}
-    for shown in table("docs/robot.md", first):
+@pytest.mark.parametrize("name", STOPS)
+def test_stops_are_those_of_their_rows(name):
+    rows = json.loads((DATA / name).read_text())
+    found = {row.get("case") or row["faults"]: row for row in rows}
+    pairs = [row for case, row in found.items() if "+" in case]
+    for shown in table("docs/robot.md", *STOPS[name]):
         case = next(iter(shown.values())).strip("`")
-        if case == "worst of all pairs":
-            pairs = [row for case, row in rows.items() if "+" in case]
-            for title, column, scale in columns:
-                worst = scale * max(row[column]["worst"] for row in pairs)
-                assert float(shown[title]) == pytest.approx(worst, abs=0.51), title
-            continue
-        for title, column, scale in columns:
-            known = [x for x in rows[case][column].values() if x is not None]
-            expected = [scale * x for x in known]
-            found = pairs_of(shown[title])
-            assert found == pytest.approx(expected, abs=0.51), (case, title)
+        for title, (column, scale, digits) in STOPS[name].items():
+            if case == "worst of all pairs":
+                known = [max(row[column]["worst"] for row in pairs)]
+            else:
+                known = [x for x in found[case][column].values() if x is not None]
+            expected = " / ".join(f"{scale * x:.{digits}f}" for x in known)
+            assert shown[title] == expected, (case, title)
 
 
-def test_tracking_and_filters_are_those_of_their_rows():
-    rows = rows_of("tracking.csv")
-    for shown in table("docs/robot.md", "latency, ms"):
-        row = next(
-            r
-            for r in rows
-            if (r["filter"], r["time_s"], r["clock"])
-            == (shown["filter"], shown["time, s"], shown["clock"])
-        )
-        assert shown["latency, ms"] == row["latency_ms"]
-        assert pairs_of(shown["error, mm"]) == [
-            float(row["rms_mm"]),
-            float(row["largest_mm"]),
-        ]
+def test_faults_of_the_lab_are_those_of_their_rows():
+    rows = json.loads((DATA / "lab_faults.json").read_text())
+    shown = table("docs/lab.md", "reason of the end")
+    titles = "episode ends, ms", "at rest, ms", "moved on, mm"
+    for line, row in zip(shown, rows, strict=True):
+        assert line["fault"] == f"`{row['faults']}`"
+        assert line["reason of the end"] == (row["reason"] or "plays on")
+        columns = "ended_s", "rest_s", "moved_m"
+        for title, column in zip(titles, columns, strict=True):
+            value = row[column]
+            assert line[title] == ("" if value is None else f"{1e3 * value:.0f}")
+
+
+def test_tracking_is_that_of_its_rows():
+    rows = {(row["filter"], row["clock"]): row for row in rows_of("tracking.csv")}
+    shown = table("docs/robot.md", "latency, ms")
+    assert len(shown) == len(rows)
+    for line in shown:
+        row = rows[line["filter"], line["clock"]]
+        assert line["latency, ms"] == row["latency_ms"]
+        assert line["error, mm"] == f"{row['rms_mm']} / {row['largest_mm']}"
+
+
+def test_filters_are_those_of_their_rows():
+    cell = "task", "commands", "limits", "filter"
+    rows = {(*map(r.get, cell), r["time_s"]): r for r in rows_of("smoothing.csv")}
+    shown = table("docs/robot.md", "protective stops an hour")
+    assert len(shown) >= 20
+    for line in shown:
+        row = rows[(*map(line.get, cell), line["time, s"])]
+        assert line["success"] == f"{row['success']} ({row['low']} .. {row['high']})"
+        titles = "acceleration, m/s2, largest", "jerk, m/s3, largest", "jerk, RMS"
+        columns = "acceleration_peak", "jerk_peak", "jerk_rms"
+        for title, column in zip(titles, columns, strict=True):
+            assert line[title] == row[column]
+        assert line["protective stops an hour"] == row["stops_per_hour"]
+
+
+def test_distances_after_a_stop_are_those_of_the_limits():
+    for line in table("docs/robot.md", "moves on by"):
+        speed = float(line["speed"].removesuffix(" m/s"))
+        distance = LATEST * speed + MotionLimits(speed=speed).stopping_distance
+        assert line["moves on by"] == f"{distance:.2f} m"

@@ -59,7 +59,7 @@ def test_a_reach_beyond_the_joints_is_refused_before_anything_moves(rig, tmp_pat
     fast = dataclasses.replace(found.limits, speed=1.0)
     path = tmp_path / "fast.json"
     dataclasses.replace(found, limits=fast).save(path)
-    with pytest.raises(ValueError, match=r"joint \d needs .* for 1.0 m/s"):
+    with pytest.raises(RuntimeError, match=r"joint \d needs .* for 1.0 m/s"):
         ah.parallel_env("reach", **keywords(path))
 
 

@@ -22,7 +22,6 @@ from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.camera import Camera, open_source
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.devices.robot import DriverState, Fault, Robot, RobotError
-from marl_airhockey.devices.robot.limits import check_reach, read_limits
 from marl_airhockey.devices.vision import Detector, Sighting
 from marl_airhockey.devices.vision.calibration import view_trouble
 from marl_airhockey.devices.vision.rectifier import Rectifier
@@ -105,7 +104,7 @@ class RealBackend(Backend):
         return None
 
     @classmethod
-    def table_of(cls, rig: str) -> tuple[str, str] | None:
+    def table_and_profile(cls, rig: str) -> tuple[str, str] | None:
         return Rig.load(Path(rig)).table, PROFILE
 
     def connect(self, rig: str) -> None:
@@ -134,10 +133,10 @@ class RealBackend(Backend):
                 *(self.rig.view, self.rig.puck, table.puck_radius, half),  # type: ignore[arg-type]
                 readout=self.rig.readout,
             )
-            self._check_pucks(detector)
+            if self.scene.pucks:
+                self._check_pucks(detector)
             self._overlay = Overlay(self.rig.view, table)
             self.rectifier = Rectifier(self.rig.view, table.size)
-            self._check_arm()
             self.watcher = Watcher(self._camera, detector)
             self._devices.callback(self.watcher.close)
             self._robot = self._devices.enter_context(Robot(config))
@@ -160,30 +159,11 @@ class RealBackend(Backend):
         frame = self._camera.newest
         assert frame is not None
         found = [np.round(seen.place, 2).tolist() for seen in detector.find_all(frame)]
-        if self.scene.pucks and len(found) > 1:
+        if len(found) > 1:
             raise RuntimeError(
                 f"camera: {len(found)} things have the puck's colour and size, at "
                 f"{found} m; leave one puck on the table, or calibrate another colour"
             )
-
-    def _check_arm(self) -> None:
-        """Refuse a reach that needs joint positions or speeds beyond the arm's limits.
-
-        Raises:
-            RuntimeError: The arm does not answer.
-            ValueError: A joint would exceed its limits.
-        """
-        try:
-            joints = read_limits(self.rig.robot)
-        except OSError as error:
-            raise RuntimeError(
-                f"robot at {self.rig.robot}: no arm answers ({error}); check that it "
-                "is switched on, in remote control and in this network"
-            ) from error
-        check_reach(
-            *(joints, self.rig.mounting, np.array(self.rig.tool)),
-            *(np.array(self.scene.seats[0].reach), self.rig.limits.speed),
-        )
 
     def expect(self, physics: Physics) -> None:
         self._tracker = Tracker(self.scene, physics)

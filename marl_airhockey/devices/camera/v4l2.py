@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import struct
 import time
 from collections.abc import Mapping
@@ -73,7 +74,7 @@ class CaptureSettings:
         for name, value in words.items():
             if name not in known:
                 raise ValueError(f"camera: unknown setting {name!r}; expected {known}")
-            if not value.lstrip("-").isdigit():
+            if not re.fullmatch(r"-?\d+", value):
                 raise ValueError(f"camera: {name}={value!r} must be a whole number")
         return CaptureSettings(**{name: int(value) for name, value in words.items()})
 
@@ -116,7 +117,6 @@ class CapturedSource:
         width = round(capture.get(cv2.CAP_PROP_FRAME_WIDTH))
         height = round(capture.get(cv2.CAP_PROP_FRAME_HEIGHT))
         if (width, height) != (settings.width, settings.height):
-            self.close()
             raise CameraError(
                 f"{self._path} delivers frames of {width} x {height}, not of "
                 f"{settings.width} x {settings.height}; use a size that it has: "

@@ -73,7 +73,7 @@ class Arm:
     tool: Array
     """(6,) pose of the tool's centre in the flange's frame"""
     plant: Plant
-    """What the tool touches"""
+    """Model of the objects that the tool touches"""
     tool_speed: float = 1.5
     """Speed of the tool's centre beyond which the arm stops, m/s"""
     motion: Motion = field(default_factory=Halt)

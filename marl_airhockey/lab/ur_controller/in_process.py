@@ -23,7 +23,7 @@ from marl_airhockey.types import Array
 
 COMMAND = "input_int_register_0"
 SCRIPT = "reg_offset_int = 0"
-"""What an emulated controller recognizes a control script by"""
+"""Text by which an emulated controller recognizes a control script"""
 FAULTS = {
     Safety.NORMAL: ArmFault.NONE,
     Safety.PROTECTIVE_STOP: ArmFault.PROTECTIVE_STOP,

@@ -59,7 +59,7 @@ class JointLine:
     angles: Array
     """(6,) target, rad"""
     speed: float
-    """Of the joint with the longest path, rad/s"""
+    """Speed of the joint with the longest path, rad/s"""
     acceleration: float
     """rad/s2"""
 
@@ -69,7 +69,7 @@ class Halt:
     """Braking to rest."""
 
     deceleration: float = STOP_DECELERATION
-    """Of the fastest joint, rad/s2"""
+    """Acceleration of the fastest joint, rad/s2"""
 
 
 Motion = Servo | Speed | JointSpeed | Line | JointLine | Halt
