@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 WATCHDOG = 10.0
 """Hz: the controller itself ends the program if commands come more rarely"""
-CYCLE = 0.006
-"""Time of the controller's clock that must pass between two commands, s"""
+CYCLE = 0.02
+"""Time of the controller's clock that must pass between two commands, s: ten of its
+cycles, as what is read of the clock may be a few cycles old"""
 LONGEST = 0.2
 """Longest wait for that, s; a robot that is silent is a fault after less"""
 ARRIVED = 0.02
