@@ -159,10 +159,10 @@ FAULTS = [
     ),
     Fault(
         "recording loses a step",
-        "marl_airhockey/core/recording.py",
-        "np.stack([row[n] for row in self._rows])",
-        "np.stack([row[n] for row in self._rows[1:]])",
-        "core/test_recording.py",
+        "marl_airhockey/data/writer.py",
+        "        self._step += count\n",
+        "        self._step += 1\n",
+        "data/test_recording_files.py",
     ),
     Fault(
         "rating of the loser",

@@ -1,13 +1,14 @@
-"""Commands ``airhockey data``: ``record``, ``info``, ``extract``, ``export``..."""
+"""Commands ``airhockey data`` that make recordings and look into them."""
 
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
+from rich.box import SIMPLE
 from rich.table import Table
 
 from marl_airhockey.cli.options import (
@@ -22,6 +23,7 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.cli.options import Scenario as ScenarioOption
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.cli.real_table import (
     LabOption,
     RigOption,
@@ -41,9 +43,10 @@ def record(
     driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
     scenario: ScenarioOption = None,
     episodes: Annotated[int, typer.Option(help="How many.", min=1)] = 100,
-    out: Annotated[Path, typer.Option(help="Folder of the recordings.")] = Path(
-        "recordings"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the recording; recordings/TIME-SCENARIO."),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
     observe: Annotated[
         str | None, typer.Option(help="Form of the observations that are kept.")
@@ -60,7 +63,11 @@ def record(
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Let a driver play and record it: states, observations, actions, rewards."""
+    """Let a driver play and record it: states, observations, actions, rewards.
+
+    With --out, a recording that was interrupted is gone on with.
+    """
+    from marl_airhockey.data.files import new_recording
     from marl_airhockey.data.record import record_episodes
 
     keywords = environment(backend, profile, option, other)
@@ -71,9 +78,13 @@ def record(
     player = players[name]
     if observe is not None:
         keywords["observe"] = observe
-    with real_table(keywords, lab, rig) as table:
-        path = record_episodes(player, name, game, episodes, out, seed, table, film)
-    _show([path], as_json)
+    title = game if isinstance(game, str) else game.name
+    path = out or new_recording(Path("recordings"), title)
+    with real_table(keywords, lab, rig) as table, bar() as shown:
+        task = shown.add_task("recording", total=episodes, note="")
+        count = partial(shown.update, task)
+        record_episodes(player, name, game, episodes, path, seed, table, film, count)
+    show([path], as_json)
 
 
 @data.command()
@@ -86,10 +97,10 @@ def info(
     """Say what recordings hold; a file that cannot be read is named and skipped."""
     from marl_airhockey.data.files import recordings_in
 
-    _show(recordings_in(paths), as_json)
+    show(recordings_in(paths), as_json)
 
 
-def _show(files: list[Path], as_json: bool) -> None:
+def show(paths: list[Path], as_json: bool) -> None:
     """Print a row for each recording.
 
     Raises:
@@ -99,7 +110,7 @@ def _show(files: list[Path], as_json: bool) -> None:
 
     found: list[Summary] = []
     broken: list[str] = []
-    for path in files:
+    for path in paths:
         try:
             found.append(summarize_recording(path))
         except ValueError as error:
@@ -108,12 +119,11 @@ def _show(files: list[Path], as_json: bool) -> None:
         rows = [summary.to_json() for summary in found]
         console.print_json(json.dumps({"recordings": rows, "broken": broken}))
     elif found:
-        table = Table()
-        table.add_column("file", overflow="fold", min_width=10)
-        for name in ("scenario", "profile", "who", "episodes", "steps"):
+        table = Table(box=SIMPLE, pad_edge=False)
+        for name in ("recording", "scenario", "players", "episodes"):
             table.add_column(name, overflow="fold")
-        for name in ("success", "return", "MB"):
-            table.add_column(name, justify="right")
+        for name in ("steps", "success", "return", "MB"):
+            table.add_column(name, justify="right", no_wrap=True)
         for summary in found:
             table.add_row(*summary.row())
         console.print(table)
@@ -125,81 +135,43 @@ def _show(files: list[Path], as_json: bool) -> None:
 
 
 @data.command()
-def extract(
-    video: Annotated[
-        Path, typer.Argument(help="A video of a table, or a recording with one.")
-    ],
-    rig: Annotated[
-        Path | None, typer.Option(help="File of the table's devices; the recording's.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of CSV and plot; the video's own.")
-    ] = None,
-) -> None:
-    """Find where puck and paddle were in each picture; write a CSV and a plot."""
-    require("matplotlib", "train")
-    from marl_airhockey.data.extract import extract as find_trajectories
-    from marl_airhockey.data.plots import plot_trajectories
-    from marl_airhockey.devices.rig import Rig
-
-    found = find_trajectories(video, Rig.load(rig) if rig else None)
-    folder = out or video.parent
-    folder.mkdir(parents=True, exist_ok=True)
-    rows, plot = folder / f"{video.stem}.csv", folder / f"{video.stem}.png"
-    found.write(rows)
-    plot_trajectories(found, plot)
-    for name, places in (("puck", found.puck), ("paddle", found.paddle)):
-        gaps = found.gaps(places)
-        longest = max((end - begin for begin, end in gaps), default=0.0)
-        seen = np.isfinite(places[:, 0])
-        console.print(
-            f"{name}: seen in {seen.sum()} of {len(seen)} pictures, {len(gaps)} gaps, "
-            f"the longest {longest:.2f} s"
-        )
-    console.print("files:", rows, plot, soft_wrap=True)
-
-
-@data.command()
-def export(
+def plot(
     paths: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders of them.")
     ],
-    name: Annotated[
-        str, typer.Option(help="Of the Minari dataset: airhockey/juggle/test-v0.")
-    ],
-    seat: Annotated[int, typer.Option(help="Whose steps; -1 for all, by agent.")] = 0,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder of all datasets; Minari's own.")
-    ] = None,
+    out: Annotated[Path, typer.Option(help="Picture, PNG.")] = Path("recordings.png"),
 ) -> None:
-    """Write recordings as a Minari dataset, which others load without this library."""
+    """Draw returns, lengths, places, speeds, gaps and players of recordings."""
+    require("matplotlib", "train")
+    from marl_airhockey.data.content_plot import plot_content
     from marl_airhockey.data.files import recordings_in
-    from marl_airhockey.data.minari_files import export_minari
 
-    files = recordings_in(paths)
-    folder = export_minari(files, name, out, None if seat < 0 else seat)
-    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    console.print(f"wrote {folder} ({size / 1e6:.1f} MB)", soft_wrap=True)
+    plot_content(recordings_in(paths), out)
+    console.print(f"wrote {out}", soft_wrap=True)
 
 
-@data.command(name="import")
-def import_dataset(
-    name: Annotated[str, typer.Argument(help="Of a Minari dataset of one seat.")],
-    scenario: Annotated[str, typer.Option("--scenario", "-s", help="That it is of.")],
-    out: Annotated[Path, typer.Option(help="Folder of the recording.")] = Path(
-        "recordings"
-    ),
-    root: Annotated[
-        Path | None, typer.Option(help="Folder of all datasets; Minari's own.")
-    ] = None,
-    control_dt: Annotated[
-        float, typer.Option(help="Time of a step, s, where it does not say.", min=1e-4)
-    ] = 0.05,
+@data.command()
+def check(
+    paths: Annotated[
+        list[Path], typer.Argument(help="Recordings, or folders of them.")
+    ],
 ) -> None:
-    """Write a Minari dataset as a recording, to learn from it."""
-    from marl_airhockey.data.minari_files import import_minari
+    """Read all of recordings and name what is wrong; exit 1 if anything is."""
+    from marl_airhockey.data.files import recordings_in
+    from marl_airhockey.data.reader import episodes_of
 
-    _show([import_minari(name, scenario, out, control_dt, root)], False)
+    count = 0
+    wrong: list[str] = []
+    for path in recordings_in(paths):
+        try:
+            count += sum(1 for _ in episodes_of(path, bad=wrong))
+        except ValueError as error:
+            wrong.append(str(error))
+    for words in wrong:
+        console.print(words, soft_wrap=True, markup=False)
+    console.print(f"{count} good episodes, {len(wrong)} faults")
+    if wrong:
+        raise typer.Exit(1)
 
 
 @data.command()

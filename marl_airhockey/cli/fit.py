@@ -41,12 +41,12 @@ def fit(
     """Fit the 2D table's physics to play on another one, for --physics FILE."""
     if scenario.endswith(".csv"):
         raise ValueError(f"fit: rows of a table are for airhockey fit-table {scenario}")
-    from marl_airhockey.core.recording import SUFFIX
+    from marl_airhockey.data.files import recordings_in
     from marl_airhockey.transfer.recorded_play import load_recordings, record_play
     from marl_airhockey.transfer.system_id import fit_physics
 
     if recordings is not None:
-        seen = load_recordings(sorted(recordings.glob(f"*{SUFFIX}")))
+        seen = load_recordings(recordings_in([recordings]))
     else:
         player = make_agent(driver or f"zoo/{scenario}")
         there = physics_of(physics)

@@ -18,6 +18,7 @@ from marl_airhockey.cli import (
     challenge,
     crossplay,
     data,
+    data_files,
     evaluate,
     fit,
     lab,
@@ -81,6 +82,9 @@ for name, function in COMMANDS.items():
     app.command(name)(function)
 calibrate.calibrate.command()(calibrate_delay.delay)
 calibrate.calibrate.command()(calibrate_arm.arm)
+for function in data_files.COMMANDS:
+    data.data.command()(function)
+data.data.command("import")(data_files.import_dataset)
 for name, group in GROUPS.items():
     app.add_typer(group, name=name)
 

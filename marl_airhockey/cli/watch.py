@@ -28,7 +28,7 @@ from marl_airhockey.cli.real_table import (
     name_on_table,
     real_table,
 )
-from marl_airhockey.core.recording import SUFFIX
+from marl_airhockey.data.files import is_recording
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
 
@@ -65,14 +65,14 @@ def watch(
     """
     from marl_airhockey.evaluation.watch import show_episodes
 
-    if driver.endswith(SUFFIX):
+    if is_recording(Path(driver)):
         if video is None:
             cli_play.show(Path(driver), host, port, browser)
         else:
             watch_recording(Path(driver), video)
         return
-    if any(Path(driver).glob(f"*{SUFFIX}")):
-        raise ValueError(f"{driver}: holds recordings; name one of its {SUFFIX} files")
+    if any(map(is_recording, Path(driver).glob("*"))):
+        raise ValueError(f"{driver}: holds recordings; name one of its folders")
     keywords = environment(
         backend, profile, option, other, physics, control_dt, observe
     )

@@ -9,13 +9,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.blocks import Columns
-from marl_airhockey.core.recording import RecordedEpisode, Recording
+from marl_airhockey.core.recording import Columns, RecordedEpisode, Recording
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
 from marl_airhockey.types import Memory
@@ -54,14 +53,20 @@ def _rig(keywords: Keywords) -> dict[str, Any]:
     return {"rig": json.loads(Path(path).read_text())} if path else {}
 
 
-def notes_of(world: World, row: int = 0) -> dict[str, Any]:
-    """Return what holds for the running episode of a world: seed and physics."""
+class EpisodeNotes(NamedTuple):
+    """What holds for all of an episode."""
+
+    seed: int
+    number: int
+    """Number of the episode since the world had that seed"""
+    physics: dict[str, float]
+
+
+def episode_notes(world: World, row: int = 0) -> EpisodeNotes:
+    """Return what holds for the running episode of a world."""
     episode = world.episode
-    return {
-        "seed": int(world.seeds[row]),
-        "number": int(episode.number[row]),
-        "physics": {k: float(v[row]) for k, v in episode.physics.items()},
-    }
+    physics = {k: float(v[row]) for k, v in episode.physics.items()}
+    return EpisodeNotes(int(world.seeds[row]), int(episode.number[row]), physics)
 
 
 def first_columns(world: World) -> Columns:
@@ -71,6 +76,7 @@ def first_columns(world: World) -> Columns:
     if not world.sensor.ideal:
         sensed = world.sensed
         columns |= {SENSED + name: getattr(sensed, name) for name in SEEN}
+        columns[f"{SENSED}age"] = world.sensor.age
     columns |= {MEMORY + name: value for name, value in world.memory.items()}
     if world.observer.observe == "pixels":
         return columns

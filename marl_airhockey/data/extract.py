@@ -10,8 +10,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from marl_airhockey.core.recording import SUFFIX, read_recording
+from marl_airhockey.core.recording import FILM
 from marl_airhockey.core.table import TABLES
+from marl_airhockey.data.files import is_recording
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.devices.camera import FileSource, Frame
 from marl_airhockey.devices.camera.film import read_times
 from marl_airhockey.devices.rig import Rig
@@ -78,9 +80,9 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
         ValueError: no video, one without the table, of a camera that was moved since it
             was calibrated, or with two pucks.
     """
-    recorded = path if path.suffix == SUFFIX else path.with_suffix(SUFFIX)
+    recorded = path.parent if path.name == FILM else path
     times: Array | None = None
-    if recorded.exists():
+    if is_recording(recorded):
         path, own, times = _recorded(recorded)
         rig = rig or own
     if rig is None:
@@ -118,19 +120,17 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
 
 
 def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
-    """Return the video beside a recording, its rig, and when its pictures were taken.
+    """Return the video in a recording, its rig, and when its pictures were taken.
 
     The times (N,) are those since the first episode began, s; nan for pictures that
     belong to no episode.
     """
-    recording = read_recording(path)
-    name = recording.head.get("film")
-    if not name:
+    recording, video = read_recording(path), path / FILM
+    if not video.exists():
         raise ValueError(f"{path}: it was recorded without a video (teleop --film)")
     whole = [episode for episode in recording.episodes if len(episode)]
     if not whole or "device.moment" not in whole[0].columns:
         raise ValueError(f"{path}: no step of it has a picture")
-    video = path.with_name(Path(str(name)).name)
     taken = read_times(video)
     played = np.zeros(len(taken), np.bool_)
     for episode in whole:

@@ -1,47 +1,65 @@
-"""Files of recordings: those in a folder, and what those of one dataset share."""
+"""Folders of recordings: those in a folder, and what those of one dataset share."""
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.recording import SUFFIX, read_head
+from marl_airhockey.core.recording import META
+from marl_airhockey.data.reader import read_head
 
-ALIKE = ("scenario", "options", "observe", "control_dt", "profile", "players")
+ALIKE = ("scenario", "options", "observe", "control_dt", "profile")
 """Keys of heads that recordings of one dataset must share"""
 
 
+def is_recording(path: Path) -> bool:
+    """Return whether a path is the folder of a recording."""
+    return (path / META).is_file()
+
+
 def recordings_in(paths: Sequence[Path]) -> list[Path]:
-    """Return the files among some paths and in the folders among them.
+    """Return the recordings among some paths and in the folders among them.
 
     Raises:
-        ValueError: a path that is not there, or no recording at all.
+        ValueError: A path that is not there, or no recording at all.
     """
-    files: list[Path] = []
+    found: list[Path] = []
     for path in paths:
         if not path.exists():
             raise ValueError(f"{path}: there is no such file or folder")
-        files += sorted(path.rglob(f"*{SUFFIX}")) if path.is_dir() else [path]
-    if not files:
-        raise ValueError(f"{paths[0]}: there are no recordings (*{SUFFIX}) in it")
-    return files
+        found += sorted(meta.parent for meta in path.rglob(META))
+    if not found:
+        raise ValueError(f"{paths[0]}: there are no recordings in it ({META})")
+    return found
 
 
-def shared_head(files: Sequence[Path]) -> dict[str, Any]:
+def new_recording(folder: Path, scenario: str) -> Path:
+    """Return a path for a new recording in a folder, named by the time."""
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S-%f")
+    return folder / f"{now}-{scenario}"
+
+
+def size_of(recording: Path) -> int:
+    """Return the size of a recording, bytes."""
+    return sum(file.stat().st_size for file in recording.rglob("*") if file.is_file())
+
+
+def shared_head(recordings: Sequence[Path]) -> dict[str, Any]:
     """Return what the heads of recordings share.
 
     Raises:
-        ValueError: files that differ in what they must share, named.
+        ValueError: Recordings that differ in what they must share, named.
     """
-    heads = [read_head(path) for path in files]
-    for path, head in zip(files, heads, strict=True):
+    heads = [read_head(path) for path in recordings]
+    for path, head in zip(recordings, heads, strict=True):
         for name in ALIKE:
             if name not in head:
                 raise ValueError(f"{path}: its head has no {name!r}")
-            if head[name] != heads[0][name] and name != "players":
+            if head[name] != heads[0][name]:
                 raise ValueError(
-                    f"{path}: {name} is {head[name]!r}, that of {files[0]} is "
+                    f"{path}: {name} is {head[name]!r}, that of {recordings[0]} is "
                     f"{heads[0][name]!r}; learn from one kind at a time"
                 )
     return heads[0]

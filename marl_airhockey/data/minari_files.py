@@ -22,13 +22,10 @@ import numpy as np
 from gymnasium import spaces
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import (
-    SUFFIX,
-    RecordedEpisode,
-    RecordingWriter,
-    read_recording,
-)
+from marl_airhockey.core.recording import RecordedEpisode
 from marl_airhockey.data.files import shared_head
+from marl_airhockey.data.reader import episodes_of
+from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.make import parallel_env
 from marl_airhockey.registry import gymnasium_id
 from marl_airhockey.types import Array
@@ -85,7 +82,7 @@ def export_minari(
 
 def _episodes(files: Sequence[Path]) -> Iterator[RecordedEpisode]:
     for path in files:
-        for episode in read_recording(path).episodes:
+        for episode in episodes_of(path):
             if len(episode):
                 yield episode
 
@@ -193,7 +190,7 @@ def _buffer(number: int, episode: RecordedEpisode, seat: int | None) -> EpisodeB
         reward = rewards[:, seat]
     return EpisodeBuffer(
         id=number,
-        seed=int(episode.notes.get("seed", 0)),
+        seed=int(episode.seed or 0),
         observations=observations,
         actions=actions,
         rewards=[float(x) for x in reward],
@@ -266,13 +263,15 @@ def import_minari(
         except (FileNotFoundError, ValueError) as error:
             raise ValueError(f"{name}: there is no such Minari dataset") from error
         head = _imported_head(dataset, name, scenario, control_dt)
-        folder.mkdir(parents=True, exist_ok=True)
-        path = folder / f"{name.replace('/', '-')}{SUFFIX}"
-        partial = path.with_suffix(f"{SUFFIX}.part")
-        with contextlib.closing(RecordingWriter(partial, head)) as writer:
+        path = folder / name.replace("/", "-")
+        try:
+            writer = RecordingWriter(path, head)
+        except FileExistsError as error:
+            raise ValueError(f"{path}: there is such a folder") from error
+        with writer:
             for episode in dataset.iterate_episodes():
                 _import_episode(writer, episode)
-    return partial.rename(path)
+    return path
 
 
 def _imported_head(
@@ -311,7 +310,7 @@ def _import_episode(writer: RecordingWriter, episode: Any) -> None:
     success = np.asarray(infos.get("success", np.zeros(len(seen))), bool)[1:, None]
     if not (np.isfinite(seen).all() and np.isfinite(reward).all()):
         raise ValueError(f"episode {episode.id}: numbers are missing in it")
-    writer.begin({"seed": int(episode.id)}, {"observation": seen[0]})
+    writer.begin({"observation": seen[0]}, int(episode.id))
     writer.add_rows(
         {
             "observation": seen[1:],
@@ -323,4 +322,4 @@ def _import_episode(writer: RecordingWriter, episode: Any) -> None:
             "truncated": np.asarray(episode.truncations, bool),
         }
     )
-    writer.end({"reason": "played to the end", "steps": len(reward)})
+    writer.end("played to the end")

@@ -1,8 +1,8 @@
-"""Record: episodes of a driver, played in one batch and written to one file."""
+"""Record: episodes of a driver, played in batches and written to one recording."""
 
 from __future__ import annotations
 
-import datetime
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,22 +10,25 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.blocks import Columns
-from marl_airhockey.core.recording import SUFFIX, RecordingWriter
+from marl_airhockey.core.recording import FILM, Columns
 from marl_airhockey.data.columns import (
+    episode_notes,
     first_columns,
     head_of,
-    notes_of,
     step_columns,
 )
+from marl_airhockey.data.derived import resume
+from marl_airhockey.data.files import is_recording
+from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Film
-from marl_airhockey.devices.camera.film import SUFFIX as FILM_SUFFIX
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.world.build import Keywords, build_driven_world
 from marl_airhockey.world.world import World
 
-AT_ONCE = 250
-"""Episodes that are played in one batch"""
+AT_ONCE = 64
+"""Number of episodes that are played in one batch"""
+PLAYED = "played to the end"
+"""Reason of the end of an episode that its rules or its clock ended"""
 
 
 def record_episodes(
@@ -33,74 +36,97 @@ def record_episodes(
     name: str,
     scenario: str | Scenario,
     episodes: int,
-    folder: Path,
+    path: Path,
     seed: int,
     keywords: Keywords,
     film: bool = False,
+    progress: Callable[[float], None] = lambda done: None,
 ) -> Path:
     """Let a driver play at ``paddle_0`` and its team's seats, and record it.
 
+    A recording that was interrupted is gone on with.
+
     Args:
-        driver: that plays.
-        name: its name in the file.
-        scenario: name of the scenario, or a scenario object.
-        episodes: number of them; episode i has the seed ``seed + i``.
-        folder: of the file, made if it does not exist.
-        seed: of the first episode.
-        keywords: of the environment, drivers of other seats among them.
-        film: whether to keep the pictures of a real table's camera beside it.
+        driver: Driver that plays.
+        name: Its name in the recording.
+        scenario: Name of the scenario, or a scenario object.
+        episodes: Number of episodes; episode i has the seed ``seed + i``.
+        path: Folder of the recording.
+        seed: Seed of the first episode.
+        keywords: Keywords of the environment, drivers of other seats among them.
+        film: Whether to keep the frames of a real table's camera.
+        progress: Function that is called with the number of episodes that are done.
 
     Returns:
-        The path of the file. It has that name when it is whole; until then, and if this
-        is interrupted, it ends in ``.part``.
+        ``path``.
 
     Raises:
-        ValueError: a seat without a driver, a folder that cannot be made, or a film
-            where there is no camera.
+        ValueError: A seat without a driver, a folder that cannot be made, one with
+            another recording or other files, or a film where there is no camera.
+        OSError: A full disk.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ValueError(f"{folder}: {error.strerror}") from error
     live = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
     at_once = 1 if live else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
-    now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S-%f")
-    path = folder / f"{now}-{world.scenario.name}{SUFFIX}"
     others = keywords.get("drivers", {})
     players = [
         _player(name if i == 0 else others.get(f"paddle_{i}", name))
         for i in range(len(world.scene.seats))
     ]
-    head = {**head_of(world, keywords), "players": players}
-    reel = _film(world, path) if film else None
-    if reel is not None:
-        head["film"] = path.with_suffix(FILM_SUFFIX).name
-    partial = path.with_suffix(f"{SUFFIX}.part")
-    writer = RecordingWriter(partial, head)
+    head = {**head_of(world, keywords), "players": players, "first_seed": seed}
     try:
-        for first in range(0, episodes, at_once):
-            world.reset(seed + first)
-            _record(world, writer, min(at_once, episodes - first))
+        camera = _camera(world) if film else None
+        with _opened(path, head) as writer:
+            begun = writer.episodes
+            progress(min(begun, episodes))
+            if begun and film:
+                raise ValueError(f"{path}: a film cannot be gone on with; name another")
+            reel = Film(camera, path / FILM) if camera is not None else None
+            try:
+                for first in range(begun, episodes, at_once):
+                    world.reset(seed + first)
+                    done = min(at_once, episodes - first)
+                    _record(world, writer, done)
+                    progress(first + done)
+            finally:
+                if reel is not None:
+                    reel.close()
     finally:
-        writer.close()
-        if reel is not None:
-            reel.close()
         world.close()
-    return partial.rename(path)
+    return path
 
 
-def _film(world: World, path: Path) -> Film:
-    """Begin to film a real table.
+def _opened(path: Path, head: dict[str, Any]) -> RecordingWriter:
+    """Begin a recording, or go on with one.
 
     Raises:
-        ValueError: there is no camera.
+        ValueError: The folder cannot be made, or holds something else.
+    """
+    if is_recording(path):
+        return resume(path, head)
+    try:
+        if path.is_dir() and not any(path.iterdir()):
+            path.rmdir()
+        return RecordingWriter(path, head)
+    except FileExistsError as error:
+        raise ValueError(
+            f"{path}: holds something else; name another folder"
+        ) from error
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from error
+
+
+def _camera(world: World) -> Any:
+    """Return the camera of a real table.
+
+    Raises:
+        ValueError: There is no camera.
     """
     from marl_airhockey.backends.real.backend import RealBackend
 
     if not isinstance(world.backend, RealBackend):
         raise ValueError("--film: only a real table has a camera; add --backend real")
-    return Film(world.backend.camera, path.with_suffix(FILM_SUFFIX))
+    return world.backend.camera
 
 
 def _player(driver: Any) -> dict[str, Any]:
@@ -111,11 +137,11 @@ def _player(driver: Any) -> dict[str, Any]:
 
 def _record(world: World, writer: RecordingWriter, count: int) -> None:
     """Play an episode in each world, and write the first ``count`` of them."""
-    first, notes = first_columns(world), [notes_of(world, i) for i in range(count)]
+    first, notes = first_columns(world), [episode_notes(world, i) for i in range(count)]
     rows: list[Columns] = []
     length = np.zeros(world.num_worlds, np.int64)
     done, no_actions = length > 0, np.zeros((world.num_worlds, 0, 2))
-    reasons = [""] * count
+    reasons = [PLAYED] * count
     while not done[:count].all():
         result = world.step(no_actions)
         length[~done] += 1
@@ -125,8 +151,7 @@ def _record(world: World, writer: RecordingWriter, count: int) -> None:
             reasons[0] = result.interruption
     whole = {name: np.stack([row[name] for row in rows], 1) for name in rows[0]}
     for i in range(count):
-        writer.begin(notes[i], {name: value[i] for name, value in first.items()})
+        begun = {name: value[i] for name, value in first.items()}
+        writer.begin(begun, *notes[i])
         writer.add_rows({n: value[i, : length[i]] for n, value in whole.items()})
-        writer.end(
-            {"reason": reasons[i] or "played to the end", "steps": int(length[i])}
-        )
+        writer.end(reasons[i])

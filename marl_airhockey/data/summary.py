@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import RecordedEpisode, read_recording
+from marl_airhockey.data.files import size_of
+from marl_airhockey.data.reader import read_episode_rows, read_head, step_counts
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Summary of a file."""
+    """Summary of a recording."""
 
-    file: str
+    path: str
     scenario: str
     profile: str
     backend: str
@@ -34,9 +35,11 @@ class Summary:
         """Return the cells of a table."""
         cut = f" ({self.cut_off} cut off)" if self.cut_off else ""
         return [
-            *(self.file, self.scenario, self.profile, ", ".join(self.players)),
+            self.path,
+            f"{self.scenario}, {self.profile}",
+            ", ".join(self.players),
             *(f"{self.episodes}{cut}", str(self.steps), f"{self.success:.3f}"),
-            *(f"{self.returns:.2f}", f"{self.bytes / 1e6:.2f}"),
+            *(f"{self.returns:.2f}", f"{self.bytes / 1e6:.1f}"),
         ]
 
     def to_json(self) -> dict[str, Any]:
@@ -51,29 +54,25 @@ def summarize_recording(path: Path) -> Summary:
     Raises:
         ValueError: no recording, or one that makes no sense; names the file.
     """
-    recording = read_recording(path)
-    head, played = recording.head, [e for e in recording.episodes if len(e)]
+    head, rows = read_head(path), read_episode_rows(path)
+    steps = step_counts(path, len(rows))
+    played = [row for row, count in zip(rows, steps, strict=True) if count]
     try:
         players = [row["person"] or row["driver"] for row in head.get("players", [])]
-        success = [bool(_last(episode, "success")) for episode in played]
-        returns = [float(_last(episode, "returns")) for episode in played]
+        success = [bool(row["success"][0]) for row in played]
+        returns = [float(row["returns"][0]) for row in played]
     except (KeyError, TypeError, IndexError) as error:
         raise ValueError(f"{path}: {error} is missing or wrong") from error
     return Summary(
-        file=str(path),
+        path=str(path),
         scenario=head["scenario"],
         profile=str(head.get("profile", "")),
         backend=str(head.get("backend", "")),
         players=players,
-        episodes=len(recording.episodes),
-        steps=sum(len(episode) for episode in played),
-        cut_off=sum(not episode.end for episode in recording.episodes),
+        episodes=len(rows),
+        steps=int(steps.sum()),
+        cut_off=sum(not row["reason"] for row in rows),
         success=float(np.mean(success)) if success else float("nan"),
         returns=float(np.mean(returns)) if returns else float("nan"),
-        bytes=path.stat().st_size,
+        bytes=size_of(path),
     )
-
-
-def _last(episode: RecordedEpisode, name: str) -> Any:
-    """Return the last value of a column for ``paddle_0``."""
-    return episode.columns[name][-1][0]

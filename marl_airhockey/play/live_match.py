@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from marl_airhockey.contracts.observable import OBSERVE
-from marl_airhockey.core.blocks import Columns
+from marl_airhockey.core.recording import Columns
 from marl_airhockey.core.seat import Seat
 from marl_airhockey.data.columns import first_columns
 from marl_airhockey.play.handicap import Handicap

@@ -1,28 +1,27 @@
 """Recorder of matches: what it has written survives a kill of the process.
 
-An episode is a file of `core.recording`, whose head names the players. The pictures of
-a camera are in a video of the same name beside it.
+An episode is a recording, see `core.recording`, whose head names the players. The
+frames of a camera are in it, too.
 """
 
 from __future__ import annotations
 
-import datetime
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.blocks import Columns
-from marl_airhockey.core.recording import SUFFIX, RecordingWriter
-from marl_airhockey.data.columns import head_of, notes_of, step_columns
+from marl_airhockey.core.recording import FILM, Columns
+from marl_airhockey.data.columns import episode_notes, head_of, step_columns
+from marl_airhockey.data.files import new_recording
+from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Camera, Film
-from marl_airhockey.devices.camera.film import SUFFIX as FILM_SUFFIX
 from marl_airhockey.play.live_match import LiveMatch
 
 
 class Recorder:
-    """Writer of the episodes of a match, a file each.
+    """Writer of the episodes of a match, a recording each.
 
     Args:
         folder: is made if it does not exist.
@@ -43,32 +42,27 @@ class Recorder:
         """Value of the key "study" of the head."""
         self._writer: RecordingWriter | None = None
         self.path: Path | None = None
-        """Path of the last file."""
+        """Path of the last recording."""
 
     def begin(self, match: LiveMatch, players: list[dict[str, Any]]) -> Path:
-        """Begin a file and return its path.
+        """Begin a recording and return its path.
 
         Args:
             match: whose first step of an episode has been made.
             players: by seat: driver, person's pseudonym, consent.
         """
         self.end(match, "cut off")
-        now = datetime.datetime.now(datetime.UTC)
-        stamp = now.strftime("%Y%m%d-%H%M%S-%f")
-        name = f"{stamp}-{match.world.scenario.name}{SUFFIX}"
-        path = self.path = self._folder / name
+        path = self.path = new_recording(self._folder, match.world.scenario.name)
         head = {
             **head_of(match.world, match.keywords),
             "players": players,
             "handicap": vars(match.drivers.handicap),
             "study": self.notes,
         }
-        if self._camera is not None:
-            film = path.with_suffix(FILM_SUFFIX)
-            self._film = Film(self._camera, film)
-            head["film"] = film.name
         self._writer = RecordingWriter(path, head)
-        self._writer.begin(notes_of(match.world), _only(match.first))
+        if self._camera is not None:
+            self._film = Film(self._camera, path / FILM)
+        self._writer.begin(_only(match.first), *episode_notes(match.world))
         return path
 
     def step(self, match: LiveMatch, delays: list[float | None]) -> None:
@@ -87,10 +81,10 @@ class Recorder:
         self._writer.add(row)
 
     def end(self, match: LiveMatch, reason: str) -> None:
-        """Write how the episode ended and close the file, if one is open."""
+        """Write how the episode ended and close the recording, if one is open."""
         if self._writer is None:
             return
-        self._writer.end({"reason": reason, "steps": match.ticks})
+        self._writer.end(reason)
         self._writer.close()
         self._writer = None
         if self._film is not None:

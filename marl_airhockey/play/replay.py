@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.recording import RecordedEpisode, Recording, read_recording
+from marl_airhockey.core.recording import RecordedEpisode, Recording
 from marl_airhockey.data.columns import memories_of, scenario_of, states_of
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.messages import description, drawn, events
 
 
@@ -53,7 +54,7 @@ def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
             "players": head.get("players", []),
         },
         "steps": steps,
-        "end": episode.end,
+        "end": {"reason": episode.reason, "steps": len(episode)},
     }
 
 

@@ -10,14 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import (
-    SUFFIX,
-    RecordedEpisode,
-    read_head,
-    read_recording,
-)
+from marl_airhockey.core.recording import META, RecordedEpisode
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.columns import scenario_of
+from marl_airhockey.data.reader import read_head, read_recording
 from marl_airhockey.evaluation.stats import bootstrap, elo, interval, iqm
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.measures import MOVING, Player, measure
@@ -146,20 +142,19 @@ def summarize(folder: Path, scenario: str | None = None) -> Report:
     """
     if not folder.is_dir():
         raise ValueError(f"{folder}: there is no such folder")
-    recordings = [
-        read_recording(path)
-        for path in sorted(folder.rglob(f"*{SUFFIX}"))
-        if not read_head(path).get("study", {}).get("practice")
-    ]
-    games = sorted({recording.head["scenario"] for recording in recordings})
+    paths = [meta.parent for meta in sorted(folder.rglob(META))]
+    heads = {path: read_head(path) for path in paths}
+    heads = {p: h for p, h in heads.items() if not h.get("study", {}).get("practice")}
+    games = sorted({head["scenario"] for head in heads.values()})
     if scenario is None and len(games) > 1:
         raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
-    wanted = [r for r in recordings if scenario in (None, r.head["scenario"])]
+    wanted = [p for p, h in heads.items() if scenario in (None, h["scenario"])]
     if not wanted:
         what = f" of {scenario}" if scenario else ""
-        raise ValueError(f"{folder}: there are no recordings{what} (*{SUFFIX}) in it")
+        raise ValueError(f"{folder}: there are no recordings{what} in it")
     found = Report({}, [], 0, 0)
-    for recording in wanted:
+    for path in wanted:
+        recording = read_recording(path)
         scene = scenario_of(recording).scene
         for episode in recording.episodes:
             _add(found, recording.head, scene, episode)
@@ -175,7 +170,7 @@ def _add(
         name = row["person"] or _program(row["driver"], handicap)
         known = found.players.setdefault(name, Player(name, row["person"] is not None))
         players.append(known)
-    complete = episode.end.get("reason") == COMPLETE
+    complete = episode.reason == COMPLETE
     found.episodes += 1
     found.broken_off += not complete
     teams = [seat.team for seat in scene.seats]

@@ -66,6 +66,8 @@ class Sensor:
         pucks, b = scene.bodies.pucks, num_worlds
         self.history = np.zeros((b, HISTORY, pucks, 4))
         """(B, HISTORY, pucks, 4) sensed x, y, m, visibility and age, s, newest last."""
+        self.age = np.zeros((b, pucks))
+        """(B, pucks) age of the simulated camera's newest frame of each puck, s."""
         self.frames = np.zeros((b, FRAMES, len(scene.bodies), 2))
         """(B, FRAMES, N, 2) sensed positions of all bodies, m, newest last."""
         self.requested = np.zeros((b, PENDING, scene.bodies.paddles, 2))
@@ -136,20 +138,20 @@ class Sensor:
         rows: Rows = ALL,
     ) -> State:
         """Return the sensed state; time has passed in the worlds ``rows`` alone."""
-        sensed, age = state, None
+        sensed = state
         if self.camera is not None:
-            sensed, age = self.camera.look(state, values, streams, rows)
+            sensed, self.age = self.camera.look(state, values, streams, rows)
         if self._keeps:
-            self._append(self.history, self._newest(sensed, age), rows)
+            self._append(self.history, self._newest(sensed), rows)
             self._append(self.frames, sensed.position, rows)
         return sensed
 
-    def _newest(self, sensed: State, age: Array | None) -> Array:
+    def _newest(self, sensed: State) -> Array:
         """Return the newest row (B, pucks, 4) of the history."""
         if self._sight is not None:
             return self._sight()
-        age = np.zeros(sensed.visible.shape) if age is None else age
-        return np.concatenate([sensed.puck, np.stack([sensed.visible, age], -1)], -1)
+        seen = np.stack([sensed.visible, self.age], -1)
+        return np.concatenate([sensed.puck, seen], -1)
 
     @staticmethod
     def _append(past: Array, newest: Array, rows: Rows) -> None:

@@ -17,7 +17,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.recording import SUFFIX, read_head
+from marl_airhockey.core.recording import META
+from marl_airhockey.data.reader import read_head
 from marl_airhockey.study.plan import Plan
 
 FORMAT = 1
@@ -175,10 +176,10 @@ def erase(folder: Path, code: str) -> int:
             number = diary.number
             gone += sum(p.is_file() for p in diary.folder.rglob("*"))
             shutil.rmtree(diary.folder)
-    for path in list(folder.rglob(f"*{SUFFIX}")):
+    for path in [meta.parent for meta in folder.rglob(META)]:
         if code in [player["person"] for player in read_head(path).get("players", [])]:
-            path.unlink()
-            gone += 1
+            gone += sum(p.is_file() for p in path.rglob("*"))
+            shutil.rmtree(path)
     if not gone:
         raise ValueError(f"{folder}: there is nothing of {code!r}")
     for name in REPORTS:

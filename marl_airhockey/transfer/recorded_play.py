@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.recording import SUFFIX, read_recording
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.columns import scenario_of
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_driven_world
 
@@ -98,7 +98,7 @@ def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
     recordings = [read_recording(path) for path in paths]
     names = {recording.head["scenario"] for recording in recordings}
     if len(names) != 1:
-        found = ", ".join(sorted(names)) or f"none ({SUFFIX} files)"
+        found = ", ".join(sorted(names)) or "none"
         raise ValueError(
             f"fit: recordings of one scenario are needed, found: {found}; "
             "airhockey data record makes them"

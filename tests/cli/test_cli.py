@@ -88,13 +88,13 @@ def test_demo_makes_what_it_says(tmp_path):
         (("train", "reach", "--engine", "jax"), "unknown engine 'jax'"),
         (("train", "reach", "--engine", "rllib", "--num-env-runners", "3"), "divide"),
         (("data", "report", "nowhere"), "no such folder"),
-        (("watch", "nowhere.rec"), "cannot be read"),
+        (("data", "check", "nowhere"), "no such file or folder"),
         (("league", "duel", "--games", "0"), "--games"),
         (("league", "rally"), "try airhockey crossplay rally"),
         (("export", "nowhere"), "nowhere: there is no training run"),
         (
             ("fit", "--recordings", "nowhere"),
-            "found: none (.rec files); airhockey",
+            "no such file or folder",
         ),
         (
             ("evaluate", "still", "-s", "touch", "--physics", "tilt=a:b"),
@@ -247,3 +247,22 @@ def test_a_league_with_another_seed_plays_other_games(tmp_path):
     ]
     assert tables[0]["goal_difference"] == tables[1]["goal_difference"]
     assert tables[0]["goal_difference"] != tables[2]["goal_difference"]
+
+
+def test_recordings_are_made_checked_divided_and_drawn(tmp_path):
+    made = tmp_path / "made"
+    record = "data", "record", "striker", "-s", "touch", "--out", str(made)
+    airhockey(*record, "--episodes", "3")
+    done = airhockey(*record, "--episodes", "10", "--json")
+    (row,) = json.loads(done.stdout)["recordings"]
+    assert (row["episodes"], row["cut_off"]) == (10, 0)
+    assert "10 good episodes, 0 faults" in airhockey("data", "check", str(made)).stdout
+    airhockey("data", "split", str(made), "--out", str(tmp_path / "parts"))
+    picture = tmp_path / "content.png"
+    airhockey("data", "plot", str(tmp_path / "parts"), "--out", str(picture))
+    assert picture.stat().st_size > 10_000
+    (part,) = (made / "steps").iterdir()
+    part.write_bytes(part.read_bytes()[:-100])
+    done = airhockey("data", "check", str(made), ok=False)
+    assert "cannot be read as parquet" in done.stdout
+    assert "Traceback" not in done.stderr

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from marl_airhockey.core.recording import read_recording
 from marl_airhockey.data.minari_files import export_minari, import_minari
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.registry import make_agent
 
@@ -24,7 +24,8 @@ def root(tmp_path, monkeypatch):
 
 def recorded(folder, scenario="reach", driver="reacher", episodes=3, **keywords):
     agent = make_agent(driver)
-    return record_episodes(agent, driver, scenario, episodes, folder, 0, keywords)
+    path = folder / "recording"
+    return record_episodes(agent, driver, scenario, episodes, path, 0, keywords)
 
 
 def test_a_dataset_holds_the_recording(tmp_path, root):

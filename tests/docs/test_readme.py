@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+import marl_airhockey as ah
+from marl_airhockey.data.record import record_episodes
+
 ROOT = Path(__file__).parents[2]
 FENCE = r"```python\n(.*?)```"
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -20,6 +23,10 @@ LONG = next(name for name, block in BLOCKS.items() if "HerReplayBuffer" in block
 @pytest.mark.parametrize("name", [name for name in BLOCKS if name != LONG])
 def test_a_python_block_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    if name.startswith("data-"):
+        # The page's first command makes a recording.
+        player, path = ah.make_agent("striker"), Path("recordings/juggle")
+        record_episodes(player, "striker", "juggle", 2, path, 0, {})
     exec(BLOCKS[name], {})
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pages import page_at, running, state_of, wait
 
-from marl_airhockey.core.recording import read_recording
 from marl_airhockey.data.extract import extract
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.lab.lab import LabClient
 
 
@@ -113,7 +113,7 @@ def test_a_person_leads_the_arm_by_its_video(teleop):
     if state_of(page)["phase"] == "play":
         client.ask("fault", name="lost_puck", on=True)
     wait(page, "s.phase === 'done'")
-    path = max(folder.glob("*.rec"))
+    path = max(folder.iterdir())
     recording = read_recording(path)
     (episode,) = recording.episodes
     assert episode.columns["device.joints"].shape[-1] == 6

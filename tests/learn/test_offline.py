@@ -9,7 +9,8 @@ import torch
 from torch import nn
 
 import marl_airhockey as ah
-from marl_airhockey.core.recording import read_recording
+from marl_airhockey.data.files import recordings_in
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
@@ -37,8 +38,8 @@ def expert(tmp_path_factory):
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("mixed")
-    record(folder, "zoo/reach", "reach", 20)
-    record(folder, "random", "reach", 20)
+    record(folder / "expert", "zoo/reach", "reach", 20)
+    record(folder / "random", "random", "reach", 20)
     return folder
 
 
@@ -76,7 +77,7 @@ def test_only_a_termination_ends_what_lies_ahead(tmp_path):
 
 
 def test_a_share_is_that_of_the_best_episodes(mixed):
-    files = sorted(mixed.glob("*.rec"))
+    files = recordings_in([mixed])
     config = offline_config("bc", [mixed], {})
     size = read_recording(files[0]).episodes[0].columns["observation"].shape[-1]
     whole = load_dataset(files, 0, 1.0, 0.99, size)

@@ -14,7 +14,7 @@ import websockets
 from command import airhockey
 from pages import aim, line, served
 
-from marl_airhockey.core.recording import read_recording
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.protocol import BURST, LARGEST, RateLimiter, parse
 from marl_airhockey.play.server import listen as listen_at
@@ -184,7 +184,7 @@ def test_a_killed_server_loses_no_second_of_a_recording(tmp_path):
         it.wait(10)
     (path,) = tmp_path.iterdir()
     (episode,) = read_recording(path).episodes
-    assert episode.end == {}
+    assert episode.reason == ""
     assert len(episode) >= shown - RATE
 
 

@@ -8,7 +8,7 @@ import pytest
 from pages import aim, line
 from PIL import Image
 
-from marl_airhockey.core.recording import read_recording
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.measures import interceptions, reactions
 from marl_airhockey.play.open_table import open_table
@@ -39,9 +39,9 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
         "consent": None,
     }
     (episode,) = recording.episodes
-    assert episode.notes["physics"]["tilt"] == 0.0
-    assert episode.end["reason"] == "played to the end"
-    assert len(episode) == 2 * RATE == episode.end["steps"]
+    assert episode.physics["tilt"] == 0.0
+    assert episode.reason == "played to the end"
+    assert len(episode) == 2 * RATE
     assert {"action", "command", "clock", "round_trip"} <= episode.columns.keys()
     end = episode.columns["state.position"][-1]
     np.testing.assert_array_equal(end, match.world.state.position[0])
@@ -143,4 +143,4 @@ def test_a_match_whose_players_change_does_not_count(tmp_path):
         session.tick()
     (path,) = tmp_path.iterdir()
     (episode,) = read_recording(path).episodes
-    assert episode.end["reason"] == "the players changed"
+    assert episode.reason == "the players changed"

@@ -7,7 +7,7 @@ import pytest
 from pages import aim, line
 from study_steps import PLAN, answer, consent, enter, plan_writer, play, stage
 
-from marl_airhockey.core.recording import read_head
+from marl_airhockey.data.reader import read_head
 from marl_airhockey.play.host import GONE, GRACE
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.report import summarize
@@ -31,7 +31,7 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     assert client.seat is None
     study.receive(client, line("start"))
     assert study.match.phase == "lobby"
-    assert not [*out.rglob("*.jsonl"), *out.rglob("*.rec")], (
+    assert not [*out.rglob("*.jsonl"), *out.rglob("meta.json")], (
         "nothing is kept before the consent"
     )
     with pytest.raises(ValueError, match="load the page again"):
@@ -70,7 +70,7 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
         *("game", "answer", "answer", "end"),
     ]
     assert found.rows[1]["version"] == "3"
-    metas = [read_head(path) for path in sorted(found.folder.glob("*duel.rec"))]
+    metas = [read_head(path) for path in sorted(found.folder.glob("*-duel"))]
     assert [meta["study"]["practice"] for meta in metas] == [True, False, False]
     assert metas[1]["players"][0]["person"] == code
     assert metas[1]["players"][0]["consent"] == "3"
@@ -99,10 +99,10 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     study.receive(first, line("start"))
     for _ in range(round(3.5 * RATE)):
         study.tick()
-    assert list(out.rglob("*duel.rec"))
+    assert list(out.rglob("*-duel"))
     study.receive(first, line("withdraw"))
     assert stage(study, first) == {"stage": "erased"}
-    assert not list(out.rglob("*duel.rec"))
+    assert not list(out.rglob("*-duel"))
     (line_left,) = (out / "erased.jsonl").read_text().splitlines()
     assert json.loads(line_left).keys() == {"at", "number", "files"}
     second = enter(study, "b")
@@ -113,7 +113,7 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
     assert found.number == 0
     with pytest.raises(ValueError, match="nothing of 'xyz'"):
         erase(out, "xyz")
-    assert erase(out, code) == 2
+    assert erase(out, code) > 2
     assert not list(diaries(out))
 
 
@@ -134,7 +134,7 @@ def test_people_play_each_other_and_either_can_withdraw(plan, tmp_path):
     play(study, subject)
     assert stage(study, subject)["stage"] == "questions"
     answer(study, subject)
-    games = [p for p in out.rglob("*duel.rec") if not read_head(p)["study"]["practice"]]
+    games = [p for p in out.rglob("*-duel") if not read_head(p)["study"]["practice"]]
     assert [row["consent"] for row in read_head(games[0])["players"]] == ["3", "3"]
     study.receive(partner, line("withdraw"))
     assert not games[0].exists()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from marl_airhockey.core.physics import load_physics
+from marl_airhockey.data.files import recordings_in
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
@@ -54,7 +55,7 @@ def test_recordings_are_fitted_to(tmp_path):
         while match.phase != "done":
             session.tick()
         session.tick()
-    seen = load_recordings(sorted(tmp_path.glob("*.rec")))
+    seen = load_recordings(recordings_in([tmp_path]))
     assert seen.control_dt == pytest.approx(1 / RATE)
     assert not seen.follows[0]
     assert np.isfinite(seen.position).all()

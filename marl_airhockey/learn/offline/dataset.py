@@ -10,8 +10,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from marl_airhockey.core.recording import RecordedEpisode, read_recording
+from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.types import Array
+
+NEEDED = ("observation", "observation.desired_goal", "action", "reward", "terminated")
+"""Columns that are read"""
 
 
 @dataclass(frozen=True)
@@ -85,7 +89,7 @@ def load_dataset(
 
 def _episodes(files: Sequence[Path]) -> Iterator[tuple[Path, RecordedEpisode]]:
     for path in files:
-        for episode in read_recording(path).episodes:
+        for episode in episodes_of(path, NEEDED):
             if len(episode):
                 yield path, episode
 
@@ -94,7 +98,7 @@ def _seat_of(
     path: Path, episode: RecordedEpisode, seat: int, size: int
 ) -> dict[str, Array]:
     """Return the steps of a seat in an episode."""
-    columns, where = episode.columns, f"{path}: episode {episode.notes['episode']}"
+    columns, where = episode.columns, f"{path}: episode {episode.index}"
     if "observation" not in columns:
         kept = "goals are apart" if "observation.desired_goal" in columns else "none"
         raise ValueError(f"{where}: there are no flat observations in it ({kept})")

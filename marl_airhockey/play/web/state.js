@@ -70,7 +70,7 @@ function advanceRecording(dt) {
   if (index === recording.shown) return;
   // Steps in between count for trails and sounds, unless it was a jump.
   const from = index > recording.shown && index - recording.shown < 12 ? recording.shown + 1 : index;
-  for (let i = from; i <= index; i++) receive({ ...recording.steps[i], phase: i === last && recording.end.kind ? "done" : "play" });
+  for (let i = from; i <= index; i++) receive({ ...recording.steps[i], phase: i === last && recording.end.reason ? "done" : "play" });
   recording.shown = index;
   $("scrub").value = index;
 }

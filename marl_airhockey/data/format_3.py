@@ -1,45 +1,74 @@
-"""Blocks of a recording's file: a line of JSON and, behind it, arrays."""
+"""Format 3: files of recordings before they were folders, read to convert them.
+
+A file is a row of blocks: a line of JSON and, where it has ``arrays``, the arrays that
+it lists, compressed by zlib. A block that is not whole is the end of the file.
+"""
 
 from __future__ import annotations
 
 import json
+import shutil
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from marl_airhockey.types import Array
+from marl_airhockey.core.recording import KINDS, Columns
+from marl_airhockey.data.writer import RecordingWriter
 
 LONGEST_LINE = 1 << 20
 """Longest line, bytes"""
 LARGEST_BLOCK = 1 << 28
 """Largest arrays of a block, bytes"""
-KINDS = "biuf"
-"""Kinds of numbers that arrays may have: bool, integers, floats"""
-Columns = dict[str, Array]
+SUFFIX, FORMAT = ".rec", 3
+"""Ending of the names of files, and their version"""
 
 
-def packed(notes: Mapping[str, Any], arrays: Columns | None = None) -> bytes:
-    """Return a block as bytes."""
-    line, data = dict(notes), b""
-    if arrays is not None:
-        ordered = {name: _little(value) for name, value in arrays.items()}
-        data = zlib.compress(b"".join(v.tobytes() for v in ordered.values()), 1)
-        line["arrays"] = [[n, v.dtype.str, list(v.shape)] for n, v in ordered.items()]
-        line |= {"size": len(data), "crc": zlib.crc32(data)}
-        data += b"\n"
-    text = json.dumps(line, separators=(",", ":"), allow_nan=False)
-    return text.encode() + b"\n" + data
+def convert(path: Path, out: Path) -> Path:
+    """Write a file of format 3 as a recording; return its folder.
+
+    Args:
+        path: File.
+        out: Folder of recordings.
+
+    Raises:
+        ValueError: No such file, or one that is damaged; names it.
+        FileExistsError: It has been converted before.
+    """
+    new = out / path.stem
+    try:
+        with path.open("rb") as file:
+            head = json.loads(file.readline(LONGEST_LINE))
+            if not isinstance(head, dict) or head.get("format") != FORMAT:
+                raise ValueError("no recording of format 3")
+            known = {k: v for k, v in head.items() if k not in ("kind", "format")}
+            with RecordingWriter(new, known) as writer:
+                for line, arrays in _blocks(file):
+                    _write(writer, line, arrays)
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        shutil.rmtree(new, ignore_errors=True)
+        raise ValueError(f"{path}: {error}") from error
+    return new
 
 
-def _little(value: Array) -> Array:
-    """Return an array in the order of bytes that files have."""
-    array = np.asarray(value)
-    return array.astype(array.dtype.newbyteorder("<"), order="C")
+def _write(writer: RecordingWriter, line: dict[str, Any], arrays: Columns) -> None:
+    """Write what a block holds."""
+    if line["kind"] == "begin":
+        notes = line.get("seed"), line.get("number", 0), line.get("physics", {})
+        writer.begin(arrays, *notes)
+    elif line["kind"] == "steps":
+        writer.add_rows(arrays)
+    else:
+        writer.end(str(line["reason"]))
 
 
-def blocks(file: BinaryIO) -> Iterator[tuple[dict[str, Any], Columns]]:
+def _blocks(file: BinaryIO) -> Iterator[tuple[dict[str, Any], Columns]]:
     """Yield the lines after the head with their arrays, until one is not whole.
 
     Raises:

@@ -1,0 +1,145 @@
+"""Recordings made of recordings: repaired, merged, divided, gone on with."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.data.files import shared_head
+from marl_airhockey.data.parquet import read_table, write_table
+from marl_airhockey.data.parts import parts_of
+from marl_airhockey.data.reader import (
+    episodes_of,
+    read_episode_rows,
+    read_head,
+    step_counts,
+)
+from marl_airhockey.data.writer import RecordingWriter
+
+PASSING = ("began", "versions", "columns", "format")
+"""Keys of a head that may differ where a recording is gone on with"""
+
+
+def repaired(path: Path, out: Path) -> list[str]:
+    """Write the good episodes of a recording as a new one; return what was wrong.
+
+    Raises:
+        ValueError: Not even its head can be read, or no episode, or there is such a
+            folder as ``out``.
+    """
+    head, wrong = read_head(path), list[str]()
+    writer, count = None, 0
+    try:
+        for episode in episodes_of(path, bad=wrong):
+            writer = writer or _new(out, head)
+            copy_episode(writer, episode)
+            count += 1
+    finally:
+        if writer is not None:
+            writer.close()
+    if not count:
+        raise ValueError(f"{path}: no episode of it can be read: {'; '.join(wrong)}")
+    return wrong
+
+
+def merged(paths: Sequence[Path], out: Path) -> None:
+    """Write recordings of one kind as one.
+
+    Raises:
+        ValueError: Recordings that differ, or one that makes no sense; named.
+    """
+    head = shared_head(paths)
+    with _new(out, head) as writer:
+        for path in paths:
+            for episode in episodes_of(path):
+                copy_episode(writer, episode)
+
+
+def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
+    """Write the episodes of a recording as two, `train` and `test`; return both.
+
+    Raises:
+        ValueError: Not at least one episode for each, or a recording that makes no
+            sense; named.
+    """
+    head, count = read_head(path), len(read_episode_rows(path))
+    tested = round(share * count)
+    if not 0 < tested < count:
+        raise ValueError(
+            f"--test {share}: {tested} of the {count} episodes; expected at least one "
+            "for train and one for test"
+        )
+    drawn = np.random.default_rng(seed).permutation(count)[:tested]
+    paths = [out / "train", out / "test"]
+    with _new(paths[0], head) as train, _new(paths[1], head) as test:
+        for episode in episodes_of(path):
+            copy_episode(test if episode.index in drawn else train, episode)
+    return paths
+
+
+def _new(path: Path, head: Mapping[str, object]) -> RecordingWriter:
+    """Begin a recording.
+
+    Raises:
+        ValueError: There is such a folder.
+    """
+    try:
+        return RecordingWriter(path, {**head, "columns": {}})
+    except FileExistsError as error:
+        raise ValueError(f"{path}: there is such a folder") from error
+
+
+def copy_episode(writer: RecordingWriter, episode: RecordedEpisode) -> None:
+    """Write an episode that was read."""
+    given = episode.seed, episode.number, episode.physics
+    writer.begin(episode.first, *given)
+    if len(episode):
+        writer.add_rows(episode.columns)
+    if episode.reason:
+        writer.end(episode.reason)
+
+
+def resume(path: Path, head: dict[str, object]) -> RecordingWriter:
+    """Return a writer that goes on where an interrupted recording ends.
+
+    Episodes that are not complete are deleted.
+
+    Args:
+        path: Folder of the recording.
+        head: Head with which the recording is made now.
+
+    Raises:
+        ValueError: It was made with another head; what differs is named.
+        RuntimeError: Another process writes it.
+    """
+    known = read_head(path)
+    for name in dict.fromkeys((*head, *known)):
+        if name in PASSING:
+            continue
+        # As it looks after JSON: tuples are lists there.
+        now, before = json.loads(json.dumps(head.get(name))), known.get(name)
+        if now != before:
+            raise ValueError(
+                f"{path}: it was recorded with {name} {before!r}, not {now!r}; "
+                "name another folder"
+            )
+    rows = read_episode_rows(path)
+    counts = step_counts(path, len(rows))
+    whole = [
+        bool(r["reason"]) and r["length"] == n
+        for r, n in zip(rows, counts, strict=True)
+    ]
+    kept = int(np.argmin([*whole, False]))
+    writer = RecordingWriter.extend(path, known, rows[:kept])
+    for part in parts_of(path):
+        table = read_table(part)
+        good = table["episode"].to_numpy() < kept
+        if not good.any():
+            part.unlink()
+        elif not good.all():
+            write_table(table.filter(good), part)
+    return writer

@@ -1,0 +1,137 @@
+"""Parquet: columns of numpy arrays as tables, and back."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.recording import Column, Columns
+from marl_airhockey.types import Array
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+EXTRA = "data"
+"""Extra that brings pyarrow"""
+SETTINGS: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
+"""Settings of all files"""
+KEYS = ("episode", "step")
+"""Columns of steps that number the rows"""
+
+
+def table_of(episode: Array, step: Array, columns: Columns) -> pa.Table:
+    """Return a table of n steps.
+
+    Args:
+        episode: (n,) numbers of episodes.
+        step: (n,) numbers of steps in them.
+        columns: Arrays (n, ...) by name.
+    """
+    require("pyarrow", EXTRA)
+    import pyarrow as pa
+
+    arrays = {"episode": pa.array(episode), "step": pa.array(step)}
+    for name, values in columns.items():
+        flat = pa.array(np.ascontiguousarray(values).reshape(-1))
+        size = int(np.prod(values.shape[1:], dtype=np.int64))
+        if values.ndim == 1:
+            arrays[name] = flat
+        elif size:  # Parquet has no lists of nothing.
+            arrays[name] = pa.FixedSizeListArray.from_arrays(flat, size)
+    return pa.table(arrays)
+
+
+def columns_of(table: pa.Table, layout: Mapping[str, Column]) -> Columns:
+    """Return columns (n, ...) of a table of n steps.
+
+    Raises:
+        ValueError: A column that is missing, or does not fit its description; named.
+    """
+    return {name: _values(table, name, column) for name, column in layout.items()}
+
+
+def _values(table: pa.Table, name: str, column: Column) -> Array:
+    import pyarrow as pa
+
+    rows = len(table)
+    if not column.size:
+        return np.zeros((rows, *column.shape), column.dtype)
+    if name not in table.column_names:
+        raise ValueError(f"column {name} is missing")
+    found = table[name].combine_chunks()
+    size = 1
+    if isinstance(found, pa.FixedSizeListArray):
+        size, nulls = found.type.list_size, found.null_count
+        found = found.flatten()
+        if nulls:
+            raise ValueError(f"column {name}: values are missing")
+    kind = found.type
+    if not (pa.types.is_primitive(kind) and found.null_count == 0):
+        raise ValueError(f"column {name}: {kind}, or with values missing")
+    values = found.to_numpy(zero_copy_only=False)
+    if values.dtype != np.dtype(column.dtype) or size != column.size:
+        raise ValueError(
+            f"column {name}: {size} numbers of {values.dtype} a step, expected "
+            f"{column.size} of {column.dtype}"
+        )
+    # A copy of its own, as arrow's arrays cannot be written.
+    return np.array(values).reshape(rows, *column.shape)
+
+
+def write_table(table: pa.Table, path: Path) -> None:
+    """Write a table to the disk so that the file is there whole or not at all.
+
+    Args:
+        table: Table.
+        path: Path of the file, which may exist.
+
+    Raises:
+        OSError: A full disk, or a folder that cannot be written; names the file.
+    """
+    import pyarrow.parquet as pq
+
+    draft = path.with_name(f"{path.name}.part")
+    try:
+        with draft.open("wb") as file:
+            pq.write_table(table, file, **SETTINGS)
+            file.flush()
+            os.fsync(file.fileno())
+        draft.replace(path)
+    except OSError as error:
+        draft.unlink(missing_ok=True)
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+def read_table(path: Path, names: Iterable[str] | None = None) -> pa.Table:
+    """Read a table, or some of its columns; names that it lacks are left out.
+
+    Raises:
+        ValueError: No such file, or no parquet; names the file.
+    """
+    require("pyarrow", EXTRA)
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        # One by one, so that what is read does not depend on files beside it.
+        file = pq.ParquetFile(path, page_checksum_verification=True)
+        known = file.schema_arrow.names
+        wanted = None if names is None else [n for n in names if n in known]
+        with file:
+            table = file.read(wanted, use_threads=False)
+        table.validate(full=True)
+    except (OSError, ValueError, pa.ArrowException) as error:
+        text = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise ValueError(f"{path}: cannot be read as parquet: {text}") from error
+    return table
+
+
+def plain_rows(table: pa.Table) -> list[dict[str, Any]]:
+    """Return the rows of a small table as Python's own values."""
+    rows: list[dict[str, Any]] = table.to_pylist()
+    return rows

@@ -1,0 +1,269 @@
+"""Reader of recordings: episode by episode; what makes no sense is named."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.core.recording import (
+    EPISODES,
+    FINITE,
+    FORMAT,
+    META,
+    PHYSICS,
+    Column,
+    Columns,
+    RecordedEpisode,
+    Recording,
+)
+from marl_airhockey.data.parquet import KEYS, columns_of, plain_rows, read_table
+from marl_airhockey.data.parts import parts_of
+from marl_airhockey.types import Array
+
+LARGEST_META = 1 << 24
+"""Largest `meta.json`, bytes"""
+NEEDED = ("episode", "length", "reason")
+"""Columns without which a table of episodes is none"""
+
+
+def read_head(path: Path) -> dict[str, Any]:
+    """Return the contents of a recording's `meta.json`.
+
+    Raises:
+        ValueError: No recording, or one of another version; names it.
+    """
+    file = path / META
+    try:
+        if file.stat().st_size > LARGEST_META:
+            raise ValueError(f"{file}: larger than {LARGEST_META} bytes")
+        head = json.loads(file.read_text())
+    except OSError as error:
+        raise ValueError(
+            f"{path}: cannot be read as a recording: {error.strerror}"
+        ) from error
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ValueError(f"{file}: no recording of marl_airhockey") from error
+    if not isinstance(head, dict) or "format" not in head:
+        raise ValueError(f"{file}: no recording of marl_airhockey")
+    found, dt = head["format"], head.get("control_dt")
+    if found != FORMAT:
+        age = "older" if isinstance(found, int) and found < FORMAT else "other"
+        raise ValueError(
+            f"{path}: recorded by an {age} version of marl_airhockey (format {found}); "
+            f"this version reads format {FORMAT}"
+        )
+    if not isinstance(head.get("scenario"), str):
+        raise ValueError(f"{path}: it does not name its scenario")
+    if not (isinstance(dt, (int, float)) and 0.0 < dt < float("inf")):
+        raise ValueError(f"{path}: control_dt {dt!r} is no time of a step")
+    if not isinstance(head.get("columns"), dict):
+        raise ValueError(f"{path}: it does not describe its columns")
+    return head
+
+
+def read_episode_rows(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a recording's `episodes.parquet`; none without it.
+
+    Raises:
+        ValueError: It cannot be read, or has no episodes in order; names the file.
+    """
+    file = path / EPISODES
+    if not file.exists():
+        return []
+    rows = plain_rows(read_table(file))
+    for k, row in enumerate(rows):
+        if any(row.get(name) is None for name in NEEDED) or row["episode"] != k:
+            raise ValueError(f"{file}: row {k} is not episode {k}")
+    return rows
+
+
+def step_counts(path: Path, episodes: int) -> Array:
+    """Return the number of steps that are there of each episode.
+
+    Raises:
+        ValueError: A part that cannot be read; names it.
+    """
+    last = np.zeros(episodes, np.int64)
+    for part in parts_of(path):
+        keys = columns_of(
+            read_table(part, KEYS), dict.fromkeys(KEYS, Column("int32", ()))
+        )
+        known = keys["episode"] < episodes
+        np.maximum.at(last, keys["episode"][known], keys["step"][known])
+    return last
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a recording.
+
+    Raises:
+        ValueError: No recording, one of another version, or one that makes no sense;
+            names it and what is wrong.
+    """
+    return Recording(path, read_head(path), list(episodes_of(path)))
+
+
+def episodes_of(
+    path: Path,
+    names: Collection[str] | None = None,
+    bad: list[str] | None = None,
+) -> Iterator[RecordedEpisode]:
+    """Yield the episodes of a recording, of which one at a time is in memory.
+
+    Args:
+        path: Folder of the recording.
+        names: Names of the columns that are read; None for all.
+        bad: List to which is added what is wrong, so that good episodes are read on;
+            None to raise instead.
+
+    Raises:
+        ValueError: Something is wrong; names file or episode.
+    """
+    head, rows = read_head(path), read_episode_rows(path)
+    layout = _layout(path, head, names)
+    pieces: _Pieces | None = None
+    due = 0
+    for part in parts_of(path):
+        try:
+            found = _steps_of(part, layout)
+        except ValueError as error:
+            _complain(str(error), bad)
+            continue
+        for piece in found:
+            if pieces is not None and piece.episode > pieces.episode:
+                yield from _joined(path, pieces, rows, layout, bad)
+                due, pieces = pieces.episode + 1, None
+            if pieces is None and piece.episode >= due:
+                for k in range(due, min(piece.episode, len(rows))):
+                    if rows[k]["reason"]:
+                        _complain(f"{path}: episode {k}: its steps are missing", bad)
+                pieces = _Pieces(piece.episode)
+            if pieces is not None and piece.episode == pieces.episode:
+                pieces.add(piece)
+    if pieces is not None:
+        yield from _joined(path, pieces, rows, layout, bad)
+
+
+def _layout(
+    path: Path, head: dict[str, Any], names: Collection[str] | None
+) -> dict[str, Column]:
+    """Return the columns that are read, by name.
+
+    Raises:
+        ValueError: A description that makes no sense; names the recording.
+    """
+    try:
+        return {
+            name: Column.from_fields(name, fields)
+            for name, fields in head["columns"].items()
+            if names is None or name in names
+        }
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+
+
+@dataclass
+class _Piece:
+    """Steps of an episode in one part."""
+
+    episode: int
+    first: int
+    count: int
+    columns: Columns
+
+
+@dataclass
+class _Pieces:
+    """Steps of an episode as they are read."""
+
+    episode: int
+    columns: list[Columns] = field(default_factory=list)
+    next: int = 0
+    gap: str = ""
+
+    def add(self, piece: _Piece) -> None:
+        """Add further steps; those that are there already are left out."""
+        again = self.next - piece.first
+        if again < 0:
+            self.gap = self.gap or f"steps {self.next} to {piece.first - 1} are missing"
+        if again < piece.count:
+            kept = {n: v[max(again, 0) :] for n, v in piece.columns.items()}
+            self.columns.append(kept)
+            self.next = piece.first + piece.count
+
+
+def _complain(words: str, bad: list[str] | None) -> None:
+    if bad is None:
+        raise ValueError(words)
+    bad.append(words)
+
+
+def _steps_of(part: Path, layout: dict[str, Column]) -> list[_Piece]:
+    """Return the steps in a part, by episode.
+
+    Raises:
+        ValueError: It makes no sense; names the file.
+    """
+    table = read_table(part, [*KEYS, *layout])
+    keys = {name: Column("int32", ()) for name in KEYS}
+    try:
+        numbers, columns = columns_of(table, keys), columns_of(table, layout)
+    except ValueError as error:
+        raise ValueError(f"{part}: {error}") from error
+    episode, step = numbers["episode"], numbers["step"]
+    if not len(episode):
+        return []
+    cuts = np.flatnonzero(np.diff(episode) != 0) + 1
+    edges = [0, *cuts.tolist(), len(episode)]
+    pieces = []
+    for start, stop in itertools.pairwise(edges):
+        if (np.diff(step[start:stop]) != 1).any() or step[start] < 0:
+            raise ValueError(f"{part}: the steps of episode {episode[start]} jump")
+        own = {name: values[start:stop] for name, values in columns.items()}
+        pieces.append(_Piece(int(episode[start]), int(step[start]), stop - start, own))
+    return pieces
+
+
+def _joined(
+    path: Path,
+    pieces: _Pieces,
+    rows: list[dict[str, Any]],
+    layout: dict[str, Column],
+    bad: list[str] | None,
+) -> Iterator[RecordedEpisode]:
+    """Yield an episode, if it makes sense."""
+    where, whole = f"{path}: episode {pieces.episode}", {}
+    if pieces.episode >= len(rows) or pieces.gap:
+        words = pieces.gap or f"it is not in {EPISODES}"
+        return _complain(f"{where}: {words}", bad)
+    for name in layout:
+        whole[name] = np.concatenate([columns[name] for columns in pieces.columns])
+        lacks = np.flatnonzero(
+            ~np.isfinite(whole[name]).reshape(pieces.next, -1).all(1)
+        )
+        # Before the first step there is no action.
+        lacks = lacks[lacks >= (not name.startswith("state."))]
+        if name in FINITE and lacks.size:
+            words = f"{where}: {name} is not finite at step {lacks[0]}"
+            return _complain(words, bad)
+    row = rows[pieces.episode]
+    complete = row["length"] == pieces.next - 1
+    yield RecordedEpisode(
+        index=pieces.episode,
+        seed=row.get("seed"),
+        number=row.get("number") or 0,
+        physics={
+            name.removeprefix(PHYSICS): value
+            for name, value in row.items()
+            if name.startswith(PHYSICS) and value is not None
+        },
+        reason=row["reason"] if complete else "",
+        first={name: values[0] for name, values in whole.items()},
+        columns={name: values[1:] for name, values in whole.items()},
+    )

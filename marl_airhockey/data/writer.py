@@ -1,0 +1,247 @@
+"""Writer of recordings: what it has flushed survives a kill of the process."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.recording import (
+    EPISODES,
+    FORMAT,
+    META,
+    PHYSICS,
+    STEPS,
+    Column,
+    Columns,
+)
+from marl_airhockey.data.parquet import EXTRA, table_of, write_table
+from marl_airhockey.data.parts import merge_parts, part_path, parts_of
+
+FLUSH = 0.5
+"""Longest time for which steps wait until they are on the disk, s"""
+PART = 16_384
+"""Number of steps that wait at most"""
+
+
+class RecordingWriter:
+    """Writer of a recording.
+
+    Args:
+        path: Folder, which must not exist.
+        head: What holds for all episodes; JSON.
+
+    Raises:
+        FileExistsError: There is such a folder.
+        OSError: It cannot be made.
+    """
+
+    def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
+        require("pyarrow", EXTRA)
+        path.mkdir(parents=True)
+        (path / STEPS).mkdir()
+        self._start(path, {**head, "format": FORMAT}, [], 0)
+        self._write_meta()
+
+    @classmethod
+    def extend(
+        cls, path: Path, head: Mapping[str, Any], episodes: list[dict[str, Any]]
+    ) -> RecordingWriter:
+        """Return a writer that goes on with a recording.
+
+        Args:
+            path: Folder of a recording whose episodes are all complete.
+            head: Contents of its `meta.json`.
+            episodes: Rows of its `episodes.parquet`.
+
+        Raises:
+            RuntimeError: Another process writes it.
+        """
+        writer = cls.__new__(cls)
+        parts = parts_of(path)
+        number = int(parts[-1].stem.removeprefix("part-")) + 1 if parts else 0
+        writer._start(path, dict(head), episodes, number)
+        return writer
+
+    def _start(
+        self, path: Path, head: dict[str, Any], rows: list[dict[str, Any]], part: int
+    ) -> None:
+        self.path, self._head, self._episodes, self._part = path, head, rows, part
+        self._lock = (path / ".lock").open("w")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            self._lock.close()
+            raise RuntimeError(f"{path}: another process writes it") from error
+        self._layout: dict[str, Column] = {
+            name: Column.from_fields(name, fields)
+            for name, fields in head.get("columns", {}).items()
+        }
+        self._first: Columns | None = None
+        self._waiting: list[tuple[int, int, Columns]] = []
+        self._count, self._step = 0, 0
+        self._flushed, self._changed = time.monotonic(), False
+
+    def __enter__(self) -> RecordingWriter:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes that have begun."""
+        return len(self._episodes)
+
+    def begin(
+        self,
+        first: Columns,
+        seed: int | None = None,
+        number: int = 0,
+        physics: Mapping[str, float] | None = None,
+    ) -> None:
+        """Begin the next episode.
+
+        Args:
+            first: What is there before its first step.
+            seed: Seed of its world.
+            number: Number of the episode since the world had that seed.
+            physics: Its physical parameters.
+        """
+        self._place_first()
+        own = {f"{PHYSICS}{k}": float(v) for k, v in (physics or {}).items()}
+        row = {"episode": len(self._episodes), "seed": seed, "number": number}
+        ends = {"length": 0, "returns": [], "success": [], "reason": ""}
+        self._episodes.append({**row, **ends, **own})
+        self._first = {n: np.array(value)[None] for n, value in first.items()}
+        self._step, self._changed = 0, True
+
+    def add(self, row: Columns) -> None:
+        """Add a control step, which is on the disk within a second."""
+        self.add_rows({name: np.array(value)[None] for name, value in row.items()})
+        self._flush_in_time()
+
+    def add_rows(self, columns: Columns) -> None:
+        """Add control steps, arrays (T, ...).
+
+        Raises:
+            ValueError: Columns that are not those of the steps before; named.
+        """
+        lengths = {len(value) for value in columns.values()}
+        if len(lengths) != 1:
+            raise ValueError(f"columns have {sorted(lengths)} rows")
+        self._place_first(columns)
+        self._put(columns, lengths.pop())
+        row = self._episodes[-1]
+        row["length"] = self._step - 1
+        for name in ("returns", "success"):
+            if name in columns:
+                row[name] = np.atleast_1d(columns[name][-1]).astype(float).tolist()
+        if self._count >= PART:
+            self.flush()
+
+    def end(self, reason: str) -> None:
+        """End the episode, and say why it ended."""
+        self._place_first()
+        self._episodes[-1]["reason"], self._changed = reason, True
+        self._flush_in_time()
+
+    def _flush_in_time(self) -> None:
+        if time.monotonic() - self._flushed > FLUSH:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the steps that wait, to the disk."""
+        self._flushed = time.monotonic()
+        if self._changed:
+            write_table(self._episode_table(), self.path / EPISODES)
+            self._changed = False
+        if not self._waiting:
+            return
+        episodes, steps, blocks = zip(*self._waiting, strict=True)
+        sizes = [len(next(iter(block.values()))) for block in blocks]
+        starts = zip(steps, sizes, strict=True)
+        table = table_of(
+            np.repeat(np.array(episodes, np.int32), sizes),
+            np.concatenate([np.arange(s, s + n, dtype=np.int32) for s, n in starts]),
+            {n: np.concatenate([block[n] for block in blocks]) for n in self._layout},
+        )
+        write_table(table, part_path(self.path, self._part))
+        self._part += 1
+        self._waiting, self._count = [], 0
+
+    def close(self) -> None:
+        """Write what waits, merge small parts, and close."""
+        if self._lock.closed:
+            return
+        try:
+            self._place_first()
+            self.flush()
+            steps = sum(row["length"] + 1 for row in self._episodes)
+            if self._part > 1 + 2 * steps / PART:
+                merge_parts(self.path)
+        finally:
+            (self.path / ".lock").unlink(missing_ok=True)
+            self._lock.close()
+
+    def _place_first(self, columns: Columns | None = None) -> None:
+        """Put what was there before the first step in front of it.
+
+        Only with its first step is it known which columns steps have.
+        """
+        if self._first is None:
+            return
+        first, self._first = self._first, None
+        if not self._layout:
+            both = {**first, **(columns or {})}
+            self._layout = {name: Column.of(name, v[0]) for name, v in both.items()}
+            self._write_meta()
+        missing = {
+            name: column.missing()[None]
+            for name, column in self._layout.items()
+            if name not in first
+        }
+        self._put({**missing, **first}, 1)
+
+    def _put(self, columns: Columns, count: int) -> None:
+        """Let steps wait to be written."""
+        if columns.keys() != self._layout.keys():
+            odd = ", ".join(sorted(columns.keys() ^ self._layout.keys()))
+            raise ValueError(f"the columns of a recording change: {odd}")
+        rows = {}
+        for name, column in self._layout.items():
+            value = columns[name]
+            if value.shape[1:] != column.shape:
+                raise ValueError(
+                    f"{name}: shape {value.shape[1:]} in a step, before {column.shape}"
+                )
+            rows[name] = value.astype(column.dtype)
+        self._waiting.append((len(self._episodes) - 1, self._step, rows))
+        self._step += count
+        self._count += count
+
+    def _write_meta(self) -> None:
+        columns = {name: column._asdict() for name, column in self._layout.items()}
+        head = {**self._head, "columns": columns}
+        draft = self.path / f"{META}.part"
+        draft.write_text(json.dumps(head, indent=1, allow_nan=False) + "\n")
+        with draft.open() as file:
+            os.fsync(file.fileno())
+        draft.replace(self.path / META)
+
+    def _episode_table(self) -> Any:
+        import pyarrow as pa
+
+        kinds = {"episode": pa.int32(), "seed": pa.int64(), "number": pa.int64()}
+        kinds |= {"length": pa.int64(), "reason": pa.string()}
+        kinds |= dict.fromkeys(("returns", "success"), pa.list_(pa.float64()))
+        names = list(dict.fromkeys(name for row in self._episodes for name in row))
+        fields = [(name, kinds.get(name, pa.float64())) for name in names]
+        return pa.Table.from_pylist(self._episodes, pa.schema(fields))
