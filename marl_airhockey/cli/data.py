@@ -65,7 +65,7 @@ def record(
 ) -> None:
     """Let a driver play and record it: states, observations, actions, rewards.
 
-    With --out, a recording that was interrupted is gone on with.
+    With --out, a recording that was interrupted is resumed.
     """
     from marl_airhockey.data.files import new_recording
     from marl_airhockey.data.record import record_episodes
@@ -141,7 +141,7 @@ def plot(
     ],
     out: Annotated[Path, typer.Option(help="Picture, PNG.")] = Path("recordings.png"),
 ) -> None:
-    """Draw returns, lengths, places, speeds, gaps and players of recordings."""
+    """Plot returns, lengths, places, speeds, gaps and players of recordings."""
     require("matplotlib", "train")
     from marl_airhockey.data.content_plot import plot_content
     from marl_airhockey.data.files import recordings_in

@@ -45,7 +45,7 @@ def split(
     test: Annotated[
         float, typer.Option(help="Fraction of the episodes that go to test.")
     ] = 0.1,
-    seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random division.")] = 0,
 ) -> None:
     """Divide the episodes of a recording into two, at random."""
     from marl_airhockey.data.derived import divided

@@ -1,4 +1,4 @@
-"""Recording: what is kept of episodes, and how it lies on the disk.
+"""Recording: columns of recorded episodes, and their files.
 
 A recording is a folder that pandas or duckdb read without this library:
 
@@ -6,12 +6,13 @@ A recording is a folder that pandas or duckdb read without this library:
                            each with type, shape, unit and frame
     episodes.parquet       a row for each episode: seed, physics, length, success, end
     steps/part-*.parquet   a row for each control step, numbered by `episode` and `step`
-    film.mkv               pictures, where there is a camera, and their times beside it
+    film.mkv               frames of a camera, if any; film.times.txt has their times
 
 Step 0 of an episode is what was there before its first step. Columns that a step alone
 has, as action and reward, hold no number there: nan, or 0 where there is no nan. Arrays
-of more than one number lie flat in a row, and `shape` tells how. Nothing is rounded.
-`marl_airhockey.data.writer` and `reader` write and read it; docs/data.md lists columns.
+of more than one number are flattened; `shape` in `meta.json` is that of one step.
+Nothing is rounded. `marl_airhockey.data.writer` and `reader` write and read it;
+docs/data.md lists the columns.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ META, EPISODES, STEPS, FILM = "meta.json", "episodes.parquet", "steps", "film.mk
 """Names of the files and of the folder of steps in a recording"""
 PHYSICS = "physics."
 """Beginning of the names of columns of episodes that hold physical parameters"""
+PLAYED = "played to the end"
+"""Reason of the end of an episode that its rules or its clock ended"""
 KINDS = "biuf"
 """Kinds of numbers that columns may have: bool, integers, floats"""
 FINITE = (
@@ -128,7 +131,7 @@ class RecordedEpisode:
     physics: Mapping[str, float]
     """Physical parameters by name"""
     reason: str
-    """Why it ended; "" if the recording was cut off before"""
+    """Reason of its end; "" if the recording was interrupted before"""
     first: Columns
     """Arrays (...) before the first step"""
     columns: Columns

@@ -54,7 +54,7 @@ def _rig(keywords: Keywords) -> dict[str, Any]:
 
 
 class EpisodeNotes(NamedTuple):
-    """What holds for all of an episode."""
+    """Seed and physics of an episode."""
 
     seed: int
     number: int

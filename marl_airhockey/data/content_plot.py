@@ -23,12 +23,12 @@ DRAWN = (
     *("state.position", "state.velocity", "state.time", "returns"),
     "sensed.visible",
 )
-"""Columns that are drawn"""
+"""Columns that are plotted"""
 BINS = 40
 
 
 class Content:
-    """What is drawn of recordings.
+    """Contents of recordings that are plotted.
 
     Args:
         scene: Scene in which they were made.
@@ -119,7 +119,7 @@ def plot_content(paths: Sequence[Path], out: Path) -> None:
 
 
 def _histogram(axes: Axes, values: Mapping[str, Any], label: str) -> None:
-    """Draw histograms over each other."""
+    """Plot histograms over each other."""
     for (name, numbers), colour in zip(values.items(), (INK, "#d04010"), strict=False):
         axes.hist(numbers, bins=BINS, color=colour, alpha=0.6, label=name)
     axes.set(xlabel=label, ylabel="episodes" if len(values) == 1 else "steps")

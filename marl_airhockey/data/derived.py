@@ -1,9 +1,9 @@
-"""Recordings made of recordings: repaired, merged, divided, gone on with."""
+"""Recordings made of recordings: repaired, merged, divided, resumed."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,10 @@ from marl_airhockey.data.reader import (
     read_head,
     step_counts,
 )
-from marl_airhockey.data.writer import RecordingWriter
+from marl_airhockey.data.writer import RecordingWriter, whole_recording
 
 PASSING = ("began", "versions", "columns", "format")
-"""Keys of a head that may differ where a recording is gone on with"""
+"""Keys of a head that may differ where a recording is resumed"""
 
 
 def repaired(path: Path, out: Path) -> list[str]:
@@ -32,17 +32,12 @@ def repaired(path: Path, out: Path) -> list[str]:
             folder as ``out``.
     """
     head, wrong = read_head(path), list[str]()
-    writer, count = None, 0
-    try:
+    with whole_recording(out, head) as writer:
         for episode in episodes_of(path, bad=wrong):
-            writer = writer or _new(out, head)
             copy_episode(writer, episode)
-            count += 1
-    finally:
-        if writer is not None:
-            writer.close()
-    if not count:
-        raise ValueError(f"{path}: no episode of it can be read: {'; '.join(wrong)}")
+        if not writer.episodes:
+            words = "; ".join(wrong)
+            raise ValueError(f"{path}: no episode of it can be read: {words}")
     return wrong
 
 
@@ -53,7 +48,7 @@ def merged(paths: Sequence[Path], out: Path) -> None:
         ValueError: Recordings that differ, or one that makes no sense; named.
     """
     head = shared_head(paths)
-    with _new(out, head) as writer:
+    with whole_recording(out, head) as writer:
         for path in paths:
             for episode in episodes_of(path):
                 copy_episode(writer, episode)
@@ -75,22 +70,11 @@ def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
         )
     drawn = np.random.default_rng(seed).permutation(count)[:tested]
     paths = [out / "train", out / "test"]
-    with _new(paths[0], head) as train, _new(paths[1], head) as test:
+    new = (whole_recording(part, head) for part in paths)
+    with next(new) as train, next(new) as test:
         for episode in episodes_of(path):
             copy_episode(test if episode.index in drawn else train, episode)
     return paths
-
-
-def _new(path: Path, head: Mapping[str, object]) -> RecordingWriter:
-    """Begin a recording.
-
-    Raises:
-        ValueError: There is such a folder.
-    """
-    try:
-        return RecordingWriter(path, {**head, "columns": {}})
-    except FileExistsError as error:
-        raise ValueError(f"{path}: there is such a folder") from error
 
 
 def copy_episode(writer: RecordingWriter, episode: RecordedEpisode) -> None:
@@ -104,7 +88,7 @@ def copy_episode(writer: RecordingWriter, episode: RecordedEpisode) -> None:
 
 
 def resume(path: Path, head: dict[str, object]) -> RecordingWriter:
-    """Return a writer that goes on where an interrupted recording ends.
+    """Return a writer that resumes an interrupted recording.
 
     Episodes that are not complete are deleted.
 

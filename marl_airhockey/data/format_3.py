@@ -7,7 +7,6 @@ it lists, compressed by zlib. A block that is not whole is the end of the file.
 from __future__ import annotations
 
 import json
-import shutil
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from marl_airhockey.core.recording import KINDS, Columns
-from marl_airhockey.data.writer import RecordingWriter
+from marl_airhockey.data.writer import RecordingWriter, whole_recording
 
 LONGEST_LINE = 1 << 20
 """Longest line, bytes"""
@@ -34,8 +33,8 @@ def convert(path: Path, out: Path) -> Path:
         out: Folder of recordings.
 
     Raises:
-        ValueError: No such file, or one that is damaged; names it.
-        FileExistsError: It has been converted before.
+        ValueError: No such file, one that is damaged, or one that has been converted
+            before; names it.
     """
     new = out / path.stem
     try:
@@ -44,15 +43,12 @@ def convert(path: Path, out: Path) -> Path:
             if not isinstance(head, dict) or head.get("format") != FORMAT:
                 raise ValueError("no recording of format 3")
             known = {k: v for k, v in head.items() if k not in ("kind", "format")}
-            with RecordingWriter(new, known) as writer:
+            with whole_recording(new, known) as writer:
                 for line, arrays in _blocks(file):
                     _write(writer, line, arrays)
-    except FileExistsError:
-        raise
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from error
     except (KeyError, TypeError, ValueError) as error:
-        shutil.rmtree(new, ignore_errors=True)
         raise ValueError(f"{path}: {error}") from error
     return new
 

@@ -22,10 +22,10 @@ import numpy as np
 from gymnasium import spaces
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.core.recording import PLAYED, RecordedEpisode
 from marl_airhockey.data.files import shared_head
 from marl_airhockey.data.reader import episodes_of
-from marl_airhockey.data.writer import RecordingWriter
+from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.make import parallel_env
 from marl_airhockey.registry import gymnasium_id
 from marl_airhockey.types import Array
@@ -264,11 +264,7 @@ def import_minari(
             raise ValueError(f"{name}: there is no such Minari dataset") from error
         head = _imported_head(dataset, name, scenario, control_dt)
         path = folder / name.replace("/", "-")
-        try:
-            writer = RecordingWriter(path, head)
-        except FileExistsError as error:
-            raise ValueError(f"{path}: there is such a folder") from error
-        with writer:
+        with whole_recording(path, head) as writer:
             for episode in dataset.iterate_episodes():
                 _import_episode(writer, episode)
     return path
@@ -322,4 +318,4 @@ def _import_episode(writer: RecordingWriter, episode: Any) -> None:
             "truncated": np.asarray(episode.truncations, bool),
         }
     )
-    writer.end("played to the end")
+    writer.end(PLAYED)

@@ -118,7 +118,7 @@ def read_table(path: Path, names: Iterable[str] | None = None) -> pa.Table:
     import pyarrow.parquet as pq
 
     try:
-        # One by one, so that what is read does not depend on files beside it.
+        # One by one: pyarrow.parquet.read_table would look at the folder, too.
         file = pq.ParquetFile(path, page_checksum_verification=True)
         known = file.schema_arrow.names
         wanted = None if names is None else [n for n in names if n in known]
@@ -129,9 +129,3 @@ def read_table(path: Path, names: Iterable[str] | None = None) -> pa.Table:
         text = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ValueError(f"{path}: cannot be read as parquet: {text}") from error
     return table
-
-
-def plain_rows(table: pa.Table) -> list[dict[str, Any]]:
-    """Return the rows of a small table as Python's own values."""
-    rows: list[dict[str, Any]] = table.to_pylist()
-    return rows

@@ -22,7 +22,7 @@ from marl_airhockey.core.recording import (
     RecordedEpisode,
     Recording,
 )
-from marl_airhockey.data.parquet import KEYS, columns_of, plain_rows, read_table
+from marl_airhockey.data.parquet import KEYS, columns_of, read_table
 from marl_airhockey.data.parts import parts_of
 from marl_airhockey.types import Array
 
@@ -76,7 +76,7 @@ def read_episode_rows(path: Path) -> list[dict[str, Any]]:
     file = path / EPISODES
     if not file.exists():
         return []
-    rows = plain_rows(read_table(file))
+    rows: list[dict[str, Any]] = read_table(file).to_pylist()
     for k, row in enumerate(rows):
         if any(row.get(name) is None for name in NEEDED) or row["episode"] != k:
             raise ValueError(f"{file}: row {k} is not episode {k}")

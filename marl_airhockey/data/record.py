@@ -10,7 +10,7 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.recording import FILM, Columns
+from marl_airhockey.core.recording import FILM, PLAYED, Columns
 from marl_airhockey.data.columns import (
     episode_notes,
     first_columns,
@@ -27,8 +27,6 @@ from marl_airhockey.world.world import World
 
 AT_ONCE = 64
 """Number of episodes that are played in one batch"""
-PLAYED = "played to the end"
-"""Reason of the end of an episode that its rules or its clock ended"""
 
 
 def record_episodes(
@@ -44,7 +42,7 @@ def record_episodes(
 ) -> Path:
     """Let a driver play at ``paddle_0`` and its team's seats, and record it.
 
-    A recording that was interrupted is gone on with.
+    A recording that was interrupted is resumed.
 
     Args:
         driver: Driver that plays.
@@ -80,7 +78,7 @@ def record_episodes(
             begun = writer.episodes
             progress(min(begun, episodes))
             if begun and film:
-                raise ValueError(f"{path}: a film cannot be gone on with; name another")
+                raise ValueError(f"{path}: a film cannot be resumed; name another")
             reel = Film(camera, path / FILM) if camera is not None else None
             try:
                 for first in range(begun, episodes, at_once):
@@ -97,7 +95,7 @@ def record_episodes(
 
 
 def _opened(path: Path, head: dict[str, Any]) -> RecordingWriter:
-    """Begin a recording, or go on with one.
+    """Begin a recording, or resume one.
 
     Raises:
         ValueError: The folder cannot be made, or holds something else.

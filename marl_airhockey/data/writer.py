@@ -5,8 +5,10 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,29 @@ FLUSH = 0.5
 """Longest time for which steps wait until they are on the disk, s"""
 PART = 16_384
 """Number of steps that wait at most"""
+
+
+@contextmanager
+def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWriter]:
+    """Write a recording that is there whole or, after any error, not at all.
+
+    Args:
+        path: Folder, which must not exist.
+        head: What holds for all episodes; its columns are those that are written.
+
+    Raises:
+        ValueError: There is such a folder.
+    """
+    try:
+        writer = RecordingWriter(path, {**head, "columns": {}})
+    except FileExistsError as error:
+        raise ValueError(f"{path}: there is such a folder; name another") from error
+    try:
+        with writer:
+            yield writer
+    except BaseException:
+        shutil.rmtree(path, ignore_errors=True)
+        raise
 
 
 class RecordingWriter:
@@ -54,7 +79,7 @@ class RecordingWriter:
     def extend(
         cls, path: Path, head: Mapping[str, Any], episodes: list[dict[str, Any]]
     ) -> RecordingWriter:
-        """Return a writer that goes on with a recording.
+        """Return a writer that extends a recording.
 
         Args:
             path: Folder of a recording whose episodes are all complete.
@@ -239,7 +264,7 @@ class RecordingWriter:
     def _episode_table(self) -> Any:
         import pyarrow as pa
 
-        kinds = {"episode": pa.int32(), "seed": pa.int64(), "number": pa.int64()}
+        kinds = {"episode": pa.int32(), "seed": pa.uint64(), "number": pa.int64()}
         kinds |= {"length": pa.int64(), "reason": pa.string()}
         kinds |= dict.fromkeys(("returns", "success"), pa.list_(pa.float64()))
         names = list(dict.fromkeys(name for row in self._episodes for name in row))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import META, RecordedEpisode
+from marl_airhockey.core.recording import META, PLAYED, RecordedEpisode
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.columns import scenario_of
 from marl_airhockey.data.reader import read_head, read_recording
@@ -19,8 +19,6 @@ from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.measures import MOVING, Player, measure
 from marl_airhockey.types import Array
 
-COMPLETE = "played to the end"
-"""Reason in the end line of a game that was not broken off."""
 RESAMPLES = 400
 """Bootstrap resamples of an interval."""
 FEWEST = 5
@@ -148,12 +146,12 @@ def summarize(folder: Path, scenario: str | None = None) -> Report:
     games = sorted({head["scenario"] for head in heads.values()})
     if scenario is None and len(games) > 1:
         raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
-    wanted = [p for p, h in heads.items() if scenario in (None, h["scenario"])]
-    if not wanted:
+    chosen = [p for p, h in heads.items() if scenario in (None, h["scenario"])]
+    if not chosen:
         what = f" of {scenario}" if scenario else ""
         raise ValueError(f"{folder}: there are no recordings{what} in it")
     found = Report({}, [], 0, 0)
-    for path in wanted:
+    for path in chosen:
         recording = read_recording(path)
         scene = scenario_of(recording).scene
         for episode in recording.episodes:
@@ -170,7 +168,7 @@ def _add(
         name = row["person"] or _program(row["driver"], handicap)
         known = found.players.setdefault(name, Player(name, row["person"] is not None))
         players.append(known)
-    complete = episode.reason == COMPLETE
+    complete = episode.reason == PLAYED
     found.episodes += 1
     found.broken_off += not complete
     teams = [seat.team for seat in scene.seats]

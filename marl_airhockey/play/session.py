@@ -7,6 +7,7 @@ import json
 import time
 from typing import Any
 
+from marl_airhockey.core.recording import PLAYED
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.handicap import PRESETS
 from marl_airhockey.play.host import Host
@@ -130,7 +131,7 @@ class Session:
         elif moved:
             recorder.step(match, self._seats.delays)
         if match.phase == "done":
-            recorder.end(match, match.reason or "played to the end")
+            recorder.end(match, match.reason or PLAYED)
 
     def _broadcast(self) -> None:
         """Give every page a new frame; one that was not sent in time is dropped."""

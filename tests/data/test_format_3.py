@@ -42,7 +42,7 @@ def test_a_file_becomes_a_recording(tmp_path):
     assert episode.reason == "played to the end"
     for name, value in ROWS.items():
         np.testing.assert_array_equal(episode.columns[name], value)
-    with pytest.raises(FileExistsError):
+    with pytest.raises(ValueError, match="there is such a folder"):
         convert(tmp_path / "old.rec", tmp_path / "new")
 
 
@@ -67,3 +67,4 @@ def test_what_is_damaged_is_named(tmp_path, data, words):
     (tmp_path / "old.rec").write_bytes(data)
     with pytest.raises(ValueError, match=rf"old\.rec: .*({words})"):
         convert(tmp_path / "old.rec", tmp_path / "new")
+    assert not (tmp_path / "new" / "old").exists()

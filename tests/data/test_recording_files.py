@@ -112,6 +112,38 @@ def test_a_recording_is_never_overwritten(tmp_path):
         RecordingWriter(tmp_path / "a", HEAD)
 
 
+def test_the_largest_seed_is_kept(tmp_path):
+    with RecordingWriter(tmp_path / "a", HEAD) as file:
+        file.begin(first(), seed=2**64 - 1)
+        file.add_rows(columns(2))
+        file.end("over")
+    (episode,) = read_recording(tmp_path / "a").episodes
+    assert episode.seed == 2**64 - 1
+
+
+def test_after_an_error_there_is_no_recording(tmp_path):
+    with pytest.raises(ValueError, match="rows"):
+        write_wrong(tmp_path / "a")
+    assert not (tmp_path / "a").exists()
+    with whole(tmp_path / "a") as file:
+        file.begin(first())
+    with (
+        pytest.raises(ValueError, match="there is such a folder"),
+        whole(tmp_path / "a"),
+    ):
+        pass
+
+
+def write_wrong(path):
+    with whole(path) as file:
+        file.begin(first())
+        file.add_rows({"count": np.zeros(2), "reward": np.zeros(3)})
+
+
+def whole(path):
+    return writer.whole_recording(path, HEAD)
+
+
 def test_two_writers_do_not_share_a_folder(tmp_path):
     with RecordingWriter(tmp_path / "a", HEAD) as file:
         file.begin(first())
