@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,19 +20,21 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
-from marl_airhockey.toolkit.falling import FallingPuck
+from marl_airhockey.toolkit.falling import FewShots
 
 
 @dataclass(frozen=True, kw_only=True)
-class HitGoal(FallingPuck, GoalScenario):
+class HitGoal(FewShots, GoalScenario):
     """Task that rewards how near the rising puck has come to the circle, per metre.
 
     Only a touched and rising puck counts: a falling one crosses the circle by chance.
+    One of the first ``shots`` must enter the circle.
     """
 
+    version: ClassVar[int] = 1
     PATH = True
     seconds: float = 10.0
-    radius: float = 0.10
+    radius: float = 0.04
     """Radius of the circle (m)."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
@@ -49,11 +52,12 @@ class HitGoal(FallingPuck, GoalScenario):
         return {
             "gap": rewards.nearest(t),
             "near": np.minimum(t.memory["near"], gap.min(-1)),
-            "entered": t.memory["entered"] | entered,
+            "entered": t.memory["entered"]
+            | (entered & self.within_shots(t.new_memory)),
         }
 
     observation = (
-        *FallingPuck.observation,
+        *FewShots.observation,
         observables.Goal((0.3, 0.2), 0.31, "puck"),
     )
 
@@ -75,10 +79,11 @@ class HitGoal(FallingPuck, GoalScenario):
         }
 
     def terminated(self, t: Transition) -> Array:
-        return t.new_memory["entered"] | rewards.lost(t)
+        over = rewards.lost(t) | ~self.within_shots(t.new_memory)
+        return np.asarray(t.new_memory["entered"] | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: a touched, rising puck has been inside the circle."""
+        """(...) bool: a touched, rising puck has been inside the circle in time."""
         return t.new_memory["entered"]
 
     @property
@@ -86,7 +91,8 @@ class HitGoal(FallingPuck, GoalScenario):
         return (*self.table_geometry.size / 2, 1.0)
 
     def achieved(self, state: State, memory: Memory) -> Array:
-        rising = rewards.touched(memory) & (state.puck_velocity[..., 0, 0] > 0)
+        shot = rewards.touched(memory) & self.within_shots(memory)
+        rising = shot & (state.puck_velocity[..., 0, 0] > 0)
         return np.concatenate([state.puck[..., 0, :], 1.0 * rising[..., None]], -1)
 
     def desired(self, memory: Memory) -> Array:

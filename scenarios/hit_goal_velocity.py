@@ -1,9 +1,10 @@
-"""Hit the falling puck into a goal circle with a wanted velocity."""
+"""Hit the falling puck into a goal circle with a target velocity."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,26 +21,30 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
-from marl_airhockey.toolkit.falling import FallingPuck
+from marl_airhockey.toolkit.falling import FewShots
 from marl_airhockey.toolkit.shots import draw_shots, playable_puck
 
 
 @dataclass(frozen=True, kw_only=True)
-class HitGoalVelocity(FallingPuck, GoalScenario):
+class HitGoalVelocity(FewShots, GoalScenario):
     """Task that rewards the best match of the rising puck in position and velocity.
 
     The goal is a point of a legal shot at this very puck under the physics of the
-    episode (see `shots.draw_shots`), so that it is feasible.
+    episode (see `shots.draw_shots`), so that it is feasible. It must be met by one of
+    the first ``shots``.
     """
 
+    version: ClassVar[int] = 1
     PATH = True
     seconds: float = 10.0
-    radius: float = 0.10
+    shots: int = 1
+    """Number of distinct touches of which one must succeed."""
+    radius: float = 0.09
     """Radius of the circle (m)."""
     angle: float = 15.0
-    """Largest angle to the wanted velocity (deg)."""
+    """Largest angle to the target velocity (deg)."""
     speed_share: float = 0.20
-    """Largest error of the speed, as a share of the wanted speed."""
+    """Largest error of the speed, as a share of the target speed."""
     speed_slack: float = 0.05
     """Further error of the speed (m/s)."""
 
@@ -88,11 +93,12 @@ class HitGoalVelocity(FallingPuck, GoalScenario):
         return {
             "gap": rewards.nearest(t),
             "score": np.maximum(t.memory["score"], score),
-            "entered": t.memory["entered"] | entered,
+            "entered": t.memory["entered"]
+            | (entered & self.within_shots(t.new_memory)),
         }
 
     observation = (
-        *FallingPuck.observation,
+        *FewShots.observation,
         observables.Goal((0.3, 0.2), 0.31, "puck"),
         observables.GoalVelocity(2.5, 0.6),
     )
@@ -101,7 +107,7 @@ class HitGoalVelocity(FallingPuck, GoalScenario):
         """Return the terms.
 
         approach: metres by which the paddle came nearer to the puck than before.
-        score: 3 times the gain in the best score of place and velocity together.
+        score: 3 times the gain in the best score of position and velocity together.
         success: 3 once.
         drop: -1 when the puck passes the home line.
         """
@@ -114,10 +120,11 @@ class HitGoalVelocity(FallingPuck, GoalScenario):
         }
 
     def terminated(self, t: Transition) -> Array:
-        return t.new_memory["entered"] | rewards.lost(t)
+        over = rewards.lost(t) | ~self.within_shots(t.new_memory)
+        return np.asarray(t.new_memory["entered"] | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: a rising puck has matched the goal in place and velocity."""
+        """(...) bool: a rising puck has matched the goal in position and velocity."""
         return t.new_memory["entered"]
 
     @property
@@ -126,7 +133,8 @@ class HitGoalVelocity(FallingPuck, GoalScenario):
 
     def achieved(self, state: State, memory: Memory) -> Array:
         puck, velocity = state.puck[..., 0, :], state.puck_velocity[..., 0, :]
-        rising = rewards.touched(memory) & (velocity[..., 0] > 0)
+        shot = rewards.touched(memory) & self.within_shots(memory)
+        rising = shot & (velocity[..., 0] > 0)
         return np.concatenate([puck, velocity, 1.0 * rising[..., None]], -1)
 
     def desired(self, memory: Memory) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -21,20 +21,22 @@ from marl_airhockey.toolkit import (
     rewards,
     starts,
 )
-from marl_airhockey.toolkit.falling import FallingPuck
+from marl_airhockey.toolkit.falling import FewShots
 
 
 @dataclass(frozen=True, kw_only=True)
-class MoveBlock(FallingPuck):
-    """Task that rewards the largest displacement of the block since the first touch.
+class MoveBlock(FewShots):
+    """Task that rewards the largest displacement of the block by a shot, per metre.
 
-    The reward is per metre. Approaching the puck, and then the puck's approach to the
-    block, are rewarded as guidance.
+    Only a touched and rising puck counts: a falling one meets the block by chance. One
+    of the first ``shots`` must move it. Approaching the puck, and then the puck's
+    approach to the block, are rewarded as guidance.
     """
 
+    version: ClassVar[int] = 1
     seconds: float = 10.0
-    way: float = 0.05
-    """Displacement of the block since the first touch that is a success (m)."""
+    way: float = 0.04
+    """Displacement of the block by a shot that is a success (m)."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the block."""
 
@@ -67,27 +69,38 @@ class MoveBlock(FallingPuck):
         return {
             **super().initial_memory(state, rng),
             "origin": state.block[:, 0].copy(),
+            "pushed": np.zeros(worlds, np.bool_),
             "near": np.full(worlds, np.inf),
             "moved": np.zeros(worlds),
         }
 
     def update_memory(self, t: Transition) -> Memory:
         touched, block = rewards.touched(t.new_memory), t.after.block[..., 0, :]
-        fresh = touched & np.isinf(t.memory["near"])
-        origin = np.where(
-            (fresh | ~touched)[..., None], t.before.block[..., 0, :], t.memory["origin"]
+        speed, old_speed = (
+            length(x.block_velocity[..., 0, :]) for x in (t.after, t.before)
         )
+        hit = speed > old_speed + 1e-6
+        struck = (t.after.touched > 0).any((-1, -2))
+        rising = touched & ((t.before.puck_velocity[..., 0, 0] > 0) | struck)
+        fair = hit & rising & self.within_shots(t.new_memory)
+        # What a falling puck does to the block is not counted: it moves the origin.
+        pushed = np.where(hit, fair, t.memory["pushed"])
+        begins = fair & ~t.memory["pushed"]
+        here = np.where(begins[..., None], t.before.block[..., 0, :], block)
+        keeps = pushed & ~begins
+        origin = np.where(keeps[..., None], t.memory["origin"], here)
+        moved = length(block - origin) * pushed
         near = np.minimum(t.memory["near"], length(t.after.puck[..., 0, :] - block))
-        moved = length(block - origin) * touched
         return {
             "gap": rewards.nearest(t),
             "origin": origin,
+            "pushed": pushed,
             "near": np.where(touched, near, np.inf),
             "moved": np.maximum(t.memory["moved"], moved),
         }
 
     observation = (
-        *FallingPuck.observation,
+        *FewShots.observation,
         observables.Blocks(0.4),
         observables.PuckToBlocks(),
     )
@@ -111,10 +124,11 @@ class MoveBlock(FallingPuck):
         }
 
     def terminated(self, t: Transition) -> Array:
-        return self.success(t) | rewards.lost(t)
+        over = rewards.lost(t) | ~self.within_shots(t.new_memory)
+        return np.asarray(self.success(t) | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the block has moved by ``way`` since the first touch."""
+        """(...) bool: a shot has moved the block by ``way``."""
         return np.asarray(t.new_memory["moved"] >= self.way)
 
 

@@ -1,9 +1,10 @@
-"""Move the paddle to a goal and hold it there for two steps."""
+"""Move the paddle to a goal and come to rest there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -27,11 +28,17 @@ class Reach(GoalScenario):
     """Task that rewards progress toward the goal and, once, arrival; time costs.
 
     The goal is at least ``far`` from the paddle, so that standing still never succeeds.
+    Arrival means rest, so that driving through the goal does not succeed either.
     """
 
+    version: ClassVar[int] = 1
     seconds: float = 3.0
     radius: float = 0.02
     """Distance that counts as arrival (m)."""
+    speed: float = 0.05
+    """Speed below which the paddle is at rest (m/s)."""
+    hold: float = 0.1
+    """Time that it has to be at rest (s)."""
     far: float = 0.15
     """Shortest initial distance of a goal from the paddle (m)."""
 
@@ -55,21 +62,21 @@ class Reach(GoalScenario):
         return {
             **super().initial_memory(state, rng),
             "goal": goal,
-            "was": paddle.copy(),
-            "here": paddle.copy(),
             "gap": length(paddle - goal),
-            "held": np.zeros(len(rng), np.int64),
+            "still": np.zeros(len(rng)),
         }
 
     def update_memory(self, t: Transition) -> Memory:
-        here = t.after.paddle[..., 0, :]
-        gap = length(here - t.memory["goal"])
+        rests = length(t.after.paddle_velocity[..., 0, :]) < self.speed
+        still = t.memory["still"] + (t.after.time - t.before.time)
         return {
-            "was": t.before.paddle[..., 0, :],
-            "here": here,
-            "gap": gap,
-            "held": np.where(gap < self.radius, t.memory["held"] + 1, 0),
+            "gap": length(t.after.paddle[..., 0, :] - t.memory["goal"]),
+            "still": np.where(rests, still, 0.0),
         }
+
+    def _rests(self, memory: Memory) -> Array:
+        """(...) bool: the paddle has been at rest for long enough."""
+        return np.asarray(memory["still"] >= self.hold - 1e-9)
 
     observation = (observables.OwnPaddle(), observables.Goal((0.2, 0.2), -0.55, "own"))
 
@@ -90,23 +97,25 @@ class Reach(GoalScenario):
         return self.success(t)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the paddle has been within the radius for two steps on end."""
-        return np.asarray(t.new_memory["held"] >= 2)
+        """(...) bool: the paddle has come to rest within the radius."""
+        near = t.new_memory["gap"] < self.radius
+        return np.asarray(near & self._rests(t.new_memory))
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:
-        return (*self.table_geometry.size / 2, *self.table_geometry.size / 2)
+        return (*self.table_geometry.size / 2, 1.0)
 
     def achieved(self, state: State, memory: Memory) -> Array:
-        return np.concatenate([memory["here"], memory["was"]], -1)
+        rests = 1.0 * self._rests(memory)[..., None]
+        return np.concatenate([state.paddle[..., 0, :], rests], -1)
 
     def desired(self, memory: Memory) -> Array:
-        return np.concatenate([memory["goal"], memory["goal"]], -1)
+        goal = memory["goal"]
+        return np.concatenate([goal, np.ones((*goal.shape[:-1], 1))], -1)
 
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
-        gap = achieved - desired
-        near = length(gap[..., :2]) < self.radius
-        return 1.0 * (near & (length(gap[..., 2:]) < self.radius))
+        near = length(achieved[..., :2] - desired[..., :2]) < self.radius
+        return 1.0 * (near & (achieved[..., 2] > 0.5))
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]

@@ -1,9 +1,10 @@
-"""Pass through a goal with a wanted velocity."""
+"""Pass through a goal with a target velocity."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -28,18 +29,24 @@ class ReachVelocity(GoalScenario):
     """Task that rewards the best match so far of position and velocity together.
 
     As a running maximum it cannot be exploited; the goal lies ``margin`` inside the
-    reach, so that its velocity is feasible there in any direction.
+    reach, so that its velocity is feasible there in any direction. There is one pass:
+    the episode ends ``window`` after the paddle has entered the circle, so that
+    circling the goal with rising speed does not succeed. With goals="dict" it ends when
+    the goal is met, as the entry of a circle depends on the goal.
     """
 
+    version: ClassVar[int] = 1
     seconds: float = 5.0
     radius: float = 0.04
     """Distance that counts as arrival (m)."""
     error: float = 0.10
     """Largest error of the velocity (m/s)."""
+    window: float = 0.2
+    """Time of the pass, from the first entry of the circle (s)."""
     slow: float = 0.2
-    """Lowest wanted speed at the goal (m/s)."""
+    """Lowest target speed at the goal (m/s)."""
     fast: float = 0.5
-    """Highest wanted speed at the goal (m/s)."""
+    """Highest target speed at the goal (m/s)."""
     margin: float = 0.08
     """Least distance of a goal from every edge of the reach (m)."""
 
@@ -64,6 +71,7 @@ class ReachVelocity(GoalScenario):
             "goal_velocity": velocity,
             "gap": gap,
             "score": np.zeros(worlds),
+            "since": np.full(worlds, -np.inf),
             "passed": np.zeros(worlds, np.bool_),
         }
 
@@ -71,9 +79,12 @@ class ReachVelocity(GoalScenario):
         gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
         error = length(t.after.paddle_velocity[..., 0, :] - t.memory["goal_velocity"])
         score = tolerance(gap, 0.0, 0.10) * tolerance(error, 0.0, 0.30)
+        since = t.memory["since"] + (t.after.time - t.before.time)
+        enters = np.isinf(since) & (gap < self.radius)
         return {
             "gap": np.minimum(t.memory["gap"], gap),
             "score": np.maximum(t.memory["score"], score),
+            "since": np.where(enters, 0.0, since),
             "passed": (gap < self.radius) & (error < self.error),
         }
 
@@ -87,7 +98,7 @@ class ReachVelocity(GoalScenario):
         """Return the terms.
 
         progress: metres by which the gap to the goal shrank.
-        score: 3 times the gain in the best score of place and velocity together.
+        score: 3 times the gain in the best score of position and velocity together.
         time: -0.02 a step.
         success: 2 once.
         """
@@ -99,10 +110,11 @@ class ReachVelocity(GoalScenario):
         }
 
     def terminated(self, t: Transition) -> Array:
-        return self.success(t)
+        over = t.new_memory["since"] >= self.window - 1e-9
+        return np.asarray(self.success(t) | over)
 
     def success(self, t: Transition) -> Array:
-        """(...) bool: the paddle has matched the goal in place and velocity."""
+        """(...) bool: the paddle has matched the goal in position and velocity."""
         return t.new_memory["passed"]
 
     @property

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
+import numpy as np
+
 from marl_airhockey.contracts.observable import Observable
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.toolkit import observables, starts
-from marl_airhockey.types import Memory
+from marl_airhockey.types import Array, Memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,3 +49,19 @@ class FallingPuck(Scenario):
         observables.OwnToPucks(),
         observables.Touched(),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FewShots(FallingPuck):
+    """Base of tasks in which one of the first shots must succeed.
+
+    With any number of shots, chance succeeds: a controller that does not see the goal
+    hits it sooner or later. The touch after the last shot ends the episode.
+    """
+
+    shots: int = 2
+    """Number of distinct touches of which one must succeed."""
+
+    def within_shots(self, memory: Memory) -> Array:
+        """(...) bool: there have been no more touches than shots."""
+        return np.asarray(memory["touches"].sum((-1, -2)) <= self.shots)
