@@ -35,6 +35,7 @@ class FreeForAll(Scenario):
     seat.
     """
 
+    announced = ("lives", "shots", "stopped", "scorer", "served", "serve")
     seats: str = "arcade"
     seconds: float = 90.0
     reaction: float = 0.15

@@ -33,6 +33,7 @@ class Rally(Scenario):
     a puck at rest.
     """
 
+    announced = ("counted", "crossings", "idle")
     seats: str = "arcade"
     seconds: float = 30.0
     crossings: int = 15

@@ -67,6 +67,9 @@ class Scenario(ABC):
     seconds: float
     """Length of an episode, s."""
 
+    announced: ClassVar[tuple[str, ...]] = ()
+    """Names of the arrays of the memory that seats know from the referee, such as a
+    score; under simulated sensing they know all others from what they sense."""
     version: ClassVar[int] = 0
     """Raised whenever the numbers of the scenario change: the v of its gymnasium id."""
 

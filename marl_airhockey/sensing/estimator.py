@@ -101,6 +101,11 @@ class Estimator:
         self.now = np.zeros((*shape, 5))
         """(B, pucks, 5) estimates for now: x, y, m, vx, vy, speed of the edge, m/s"""
 
+    @property
+    def tracks(self) -> Array:
+        """(B, pucks, 5) time, s, x, y, m, vx, vy, m/s, at each puck's last frame."""
+        return np.concatenate([self._taken[..., None], self._mean[..., :4]], -1)
+
     def reset(
         self, worlds: Array, seen: Array, velocity: Array, taken: Array, paddles: Array
     ) -> None:

@@ -86,6 +86,11 @@ class Sensor:
         """Return a sensed state with the estimates of the pucks for now."""
         return sensed if self.camera is None else self.camera.estimated(sensed)
 
+    def best(self, sensed: State) -> State:
+        """Return a sensed state with estimates, if there are any."""
+        estimates = self.camera is not None and self.camera.estimates
+        return self.estimated(sensed) if estimates else sensed
+
     def note(self, actions: Array) -> None:
         """Append the actions (B, seats, 2) that are requested in a step."""
         if self._keeps:

@@ -12,6 +12,7 @@ from marl_airhockey.core.rng import RandomStreams, StreamSet
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.sensing.calibration import CalibrationMap
+from marl_airhockey.sensing.contacts import ContactSensor
 from marl_airhockey.sensing.delay import TrajectoryDelay
 from marl_airhockey.sensing.estimator import Estimator
 from marl_airhockey.sensing.occlusion import Occlusion
@@ -35,6 +36,7 @@ class SimulatedCamera:
     the last frame in which it was visible. Rarely a puck is detected where it is not.
     A velocity is the difference between the last two frames in which a body was
     visible, over the time between them. Paddles are not seen: robots report them.
+    Contacts of pucks with paddles are found in the frames, so they are known late.
 
     Args:
         scene: Scene on the tables.
@@ -69,6 +71,7 @@ class SimulatedCamera:
         self._errs = physics.any_of("false_detection")
         estimator = Estimator(scene, num_worlds, physics, control_dt)
         self._estimator = estimator if estimates else None
+        self._contacts = ContactSensor(scene, num_worlds, control_dt)
         self._position, self._velocity = np.zeros(shape), np.zeros(shape)
         self._taken = np.zeros((num_worlds, count))
         """Time of the last frame in which a body was visible, s"""
@@ -115,6 +118,21 @@ class SimulatedCamera:
                 self._taken[worlds, pucks],
                 state.paddle[worlds],
             )
+        self._contacts.reset(worlds, self._tracks[worlds], state.paddle[worlds])
+
+    @property
+    def estimates(self) -> bool:
+        """True if a filter estimates the pucks."""
+        return self._estimator is not None
+
+    @property
+    def _tracks(self) -> Array:
+        """(B, pucks, 5) time, s, position, m, velocity, m/s, in the last frames."""
+        if self._estimator is not None:
+            return self._estimator.tracks
+        pucks = slice(0, self.pucks)
+        seen = self._position[:, pucks], self._velocity[:, pucks]
+        return np.concatenate([self._taken[:, pucks, None], *seen], -1)
 
     def look(
         self,
@@ -137,8 +155,16 @@ class SimulatedCamera:
         spin = state.spin.copy()
         spin[:, self.tracked] = 0.0
         visible = state.visible & self._visible
+        found = self._contacts
         sensed = replace(
-            state, position=position, velocity=velocity, spin=spin, visible=visible
+            state,
+            position=position,
+            velocity=velocity,
+            spin=spin,
+            visible=visible,
+            touched=found.touched.copy(),
+            touched_at=found.touched_at.copy(),
+            touching=found.touching.copy(),
         )
         return sensed, state.time[:, None] - self._taken[:, : self.pucks]
 
@@ -204,6 +230,8 @@ class SimulatedCamera:
                 state.paddle[rows],
                 state.time[rows],
             )
+        tracks = self._tracks[rows]
+        self._contacts.update(tracks, state.paddle[rows], state.time[rows], rows)
 
 
 def _past(position: Array, velocity: Array, steps: int, control_dt: float) -> Array:

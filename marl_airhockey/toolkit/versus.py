@@ -28,6 +28,7 @@ class Versus(Scenario):
     the team with more shots on goal, so who attacks wins it, not who passes time.
     """
 
+    announced = ("goals", "stopped", "serve")
     seats: str = "arcade"
     seconds: float = 60.0
     reaction: float = 0.15

@@ -8,7 +8,7 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.state import State
-from marl_airhockey.types import Array
+from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.control_step import Moment
 from marl_airhockey.world.observer import Observation
 
@@ -77,22 +77,23 @@ class StepResult:
         for array in (*numbers, *self.terms.values()):
             array[worlds] = 0
 
-    def judge_sensed(
-        self, game: Scenario, sensed: State, moment: Moment, limit: Array
+    def judge_shown(
+        self, game: Scenario, state: State, memory: Memory, moment: Moment, limit: Array
     ) -> None:
-        """Replace reward and end by those of the sensed state, with goals="dict".
+        """Replace reward and end by those of what is observed, with goals="dict".
 
         The reward must be `goal_reward` of the goals in the observation, or relabelled
         transitions would contradict recorded ones. Success is that of the true state.
 
         Args:
             game: Scenario with goals="dict".
-            sensed: Sensed state of all worlds.
+            state: State of all worlds as seats know it, sensed or estimated.
+            memory: Memory of all worlds as seats know it.
             moment: Moment after the step; the returns of its episodes are corrected.
             limit: Control steps (B,) after which the clock ends an episode.
         """
         episode = moment.episode
-        met = game.goal_met(sensed, moment.verdict.memory)
+        met = game.goal_met(state, memory)
         reward = 1.0 * met[:, None]
         episode.returns[:] += reward - moment.verdict.outcome["reward"]
         self.reward[:] = self.terms["goal"][:] = reward

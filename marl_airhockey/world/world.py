@@ -35,6 +35,7 @@ from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.episode import Episode, PhysicsRows
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.referee import Referee
+from marl_airhockey.world.sensed_memory import SensedMemory
 from marl_airhockey.world.set_state import checked_memory, settled
 from marl_airhockey.world.step_result import StepResult
 
@@ -94,7 +95,8 @@ class World:
         self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
-        self._sensed = self._state
+        self._sensed = self._known = self._state
+        self._sensed_memory = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
         self.closed = False
         """True after `close`"""
@@ -302,12 +304,25 @@ class World:
         self._step.now.begin(worlds)
         self._actions.reset(worlds)
         self._sensed = self.sensor.begin(worlds, *self._true)
-        self.observer.begin(worlds, self._sensed, self._memory)
+        self._inform(worlds)
+        self.observer.begin(worlds, self._sensed, self._known_memory)
+
+    def _inform(self, worlds: Array) -> None:
+        """Let seats know the memory in some worlds, by index, as it is."""
+        if self._sensed_memory is not None:
+            self._sensed_memory.begin(worlds, self._memory)
+            self._known = self.sensor.best(self._sensed)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put rows of a state and a memory into some worlds, by index."""
         self._built.now.write(worlds, rows, memory)
         self.backend.reset(self._state, worlds)
+
+    @property
+    def _known_memory(self) -> Memory:
+        """Memory as seats know it, which observations show."""
+        known = self._sensed_memory
+        return self._memory if known is None else known.now
 
     def _adopt(self, moment: Moment) -> None:
         self._state, self._memory = moment.state, moment.verdict.memory
@@ -320,11 +335,11 @@ class World:
 
     def observation(self) -> Observation:
         """Return what the open seats observe now, freshly allocated."""
-        return self.observer.read(self._sensed, self._memory, self.open)
+        return self.observer.read(self._sensed, self._known_memory, self.open)
 
     def observe(self, seats: Array) -> Observation:
         """Return what seats (n,) would observe as open ones, freshly allocated."""
-        return self.observer.read(self._sensed, self._memory, seats)
+        return self.observer.read(self._sensed, self._known_memory, seats)
 
     def step(self, actions: Array, prescribed: Array | None = None) -> StepResult:
         """Move all worlds by one control step.
@@ -338,7 +353,7 @@ class World:
             RuntimeError: Before the first `reset`.
             ValueError: A wrong shape, or an element that is not finite.
         """
-        step, now = self._built, (self._sensed, self._memory, self._episode)
+        step, now = self._built, (self._sensed, self._known_memory, self._episode)
         self._requested = self._actions.collect(actions, prescribed, *now)
         self.sensor.note(self._requested)
         moment = step()
@@ -362,12 +377,20 @@ class World:
         """Sense, serve where a puck is needed, and observe."""
         observer, seats = self.observer, self.open
         self._sensed = self.sensor.sense(*self._true)
-        if self.scenario.goals == "dict" and not self.sensor.ideal:
-            result.judge_sensed(self.scenario, self._sensed, moment, self._limit)
+        if self._sensed_memory is not None:
+            before, self._known = self._known, self.sensor.best(self._sensed)
+            step = before, moment.realized.velocity, self._known
+            self._sensed_memory.update(*step, self._memory)
+            if self.scenario.goals == "dict":
+                shown = observer.known(
+                    self._sensed, self._known_memory, observer.observe
+                )
+                result.judge_shown(self.scenario, *shown, moment, self._limit)
         served = self._serve(moment)
-        observer.note(self._sensed, self._memory)
+        observer.note(self._sensed, self._known_memory)
         if not observer.direct:
-            result.observation = observer.read(self._sensed, self._memory, seats)
+            known = self._sensed, self._known_memory
+            result.observation = observer.read(*known, seats)
             return
         shown = {name: array.copy() for name, array in moment.shown.items()}
         result.observation = observer.of_seats(shown, seats)
@@ -376,7 +399,7 @@ class World:
 
     def _observe_again(self, observation: Observation, worlds: Array) -> None:
         """Replace what open seats observe in some worlds, by index, in place."""
-        now = self._sensed, self._memory, self.open
+        now = self._sensed, self._known_memory, self.open
         put(observation, worlds, self.observer.read(*now, worlds=worlds))
 
     def _serve(self, moment: Moment) -> Array:
@@ -392,6 +415,7 @@ class World:
         rng = self._streams.of("serve", worlds)
         self._place(worlds, *self.scenario.serve(rng, rows, memory))
         self._sensed = self.sensor.reset(worlds, *self._true)
+        self._inform(worlds)
         return worlds
 
     def _restart(self, result: StepResult) -> None:

@@ -12,12 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.core.scene import Scene
+from marl_airhockey.sensing.contacts import MARGIN, MOMENTS, contact_time
 from marl_airhockey.types import Array
-
-MOMENTS = 9
-"""Number of times between two sightings at which the paths are checked"""
-MARGIN = 0.004
-"""Largest gap that counts as a contact, m, for errors of calibration and noise"""
 
 
 class Track(NamedTuple):
@@ -54,30 +50,15 @@ def find_contacts(
         times: (n,) times of the reported paddle positions, s.
         paddle: (n, 2) reported positions of the paddle, table frame, m.
     """
+    table = scene.table
+    ends = [np.array([t.time, *t.place, *t.velocity]) for t in (before, after)]
+    near = table.puck_radius + table.paddle_radius
+    at = contact_time(*ends, times, paddle, near)
     moments = np.linspace(before.time, after.time, MOMENTS)
     on = before.place + (moments - before.time)[:, None] * before.velocity
     back = after.place + (moments - after.time)[:, None] * after.velocity
     # Each path is trusted in the half that is nearer to its sighting.
     half = MOMENTS // 2 + 1
-    where = np.stack(
-        [np.interp(moments, times, paddle[:, k]) for k in range(2)], axis=1
-    )
-    near = scene.table.puck_radius + scene.table.paddle_radius + MARGIN
-    gap_on = np.linalg.norm(on - where, axis=1) - near
-    gap_back = np.linalg.norm(back - where, axis=1) - near
-    speed = (where[-1] - where[0]) / max(after.time - before.time, 1e-6)
-    closing = ((before.velocity - speed) * (where[0] - before.place)).sum() > 0
-    leaving = ((after.velocity - speed) * (after.place - where[-1])).sum() > 0
-    met = np.minimum(
-        np.where(np.arange(MOMENTS) < half, gap_on, np.inf),
-        np.where(np.arange(MOMENTS) >= half - 1, gap_back, np.inf),
-    )
-    at = float("nan")
-    if (met < 0).any() and (closing or leaving):
-        at = float(moments[int(np.argmax(met < 0))])
-    elif (gap_on < 0).any() and closing and leaving:
-        at = float(moments[int(np.argmax(gap_on < 0))])
-    table = scene.table
     room_on = on @ table.normals.T + table.offsets - table.puck_radius - MARGIN
     room_back = back @ table.normals.T + table.offsets - table.puck_radius - MARGIN
     toward = -(table.normals @ before.velocity)
