@@ -222,12 +222,19 @@ def load_profile(path: Path) -> Profile:
     )
 
 
+RAMP = 0.025
+"""Time in which a seat at its highest acceleration makes half of a velocity change of
+half its top speed, s; robot and arcade seats need 0.1 s to their top speed"""
+
+
 def delay_of(profile: Profile) -> Range:
     """Return the least and the longest time from an event to half of the answer, s.
 
-    Nothing is counted twice: age of the frame, dead time of the command, servo.
+    It is the sum of the age of the frame, the dead time of the command, the servo and
+    `RAMP`. `scripts/reproduce/answer_times.py` measures it.
     """
     names = "observation_delay", "action_delay", "servo_time"
     ends = [profile.ranges.get(name, (0.0, 0.0)) for name in names]
     longest = profile.ranges.get("observation_jitter", (0.0, 0.0))[1]
-    return sum(low for low, _ in ends), sum(high for _, high in ends) + longest
+    least, most = (RAMP + sum(pair[end] for pair in ends) for end in (0, 1))
+    return least, most + longest

@@ -147,10 +147,10 @@ def contact_time(
             k >= half and back_x * back_x + back_y * back_y < beyond
         )
         if met and either:
-            return at
+            return float(at)
         if ahead and both and np.isnan(first):
             first = at
-    return first
+    return float(first)
 
 
 @compiled(nogil=True, error_model="numpy")

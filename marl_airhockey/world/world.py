@@ -96,7 +96,7 @@ class World:
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._known = self._state
-        self._sensed_memory = None if self.sensor.ideal else SensedMemory(scenario)
+        self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
         self.closed = False
         """True after `close`"""
@@ -115,6 +115,11 @@ class World:
     def memory(self) -> Memory:
         """Memory of the scenario; freshly allocated."""
         return {name: array.copy() for name, array in self._memory.items()}
+
+    @property
+    def sensed_memory(self) -> Memory:
+        """Memory as seats know it from what they sense; freshly allocated."""
+        return {name: array.copy() for name, array in self._known_memory.items()}
 
     @property
     def episode(self) -> Episode:
@@ -309,8 +314,8 @@ class World:
 
     def _inform(self, worlds: Array) -> None:
         """Let seats know the memory in some worlds, by index, as it is."""
-        if self._sensed_memory is not None:
-            self._sensed_memory.begin(worlds, self._memory)
+        if self._follower is not None:
+            self._follower.begin(worlds, self._memory)
             self._known = self.sensor.best(self._sensed)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
@@ -321,8 +326,7 @@ class World:
     @property
     def _known_memory(self) -> Memory:
         """Memory as seats know it, which observations show."""
-        known = self._sensed_memory
-        return self._memory if known is None else known.now
+        return self._memory if self._follower is None else self._follower.now
 
     def _adopt(self, moment: Moment) -> None:
         self._state, self._memory = moment.state, moment.verdict.memory
@@ -377,23 +381,21 @@ class World:
         """Sense, serve where a puck is needed, and observe."""
         observer, seats = self.observer, self.open
         self._sensed = self.sensor.sense(*self._true)
-        if self._sensed_memory is not None:
+        if self._follower is not None:
             before, self._known = self._known, self.sensor.best(self._sensed)
             step = before, moment.realized.velocity, self._known
-            self._sensed_memory.update(*step, self._memory)
+            self._follower.update(*step, self._memory)
             if self.scenario.goals == "dict":
-                shown = observer.known(
-                    self._sensed, self._known_memory, observer.observe
-                )
+                known = self._sensed, self._known_memory, observer.observe
+                shown = observer.known(*known)
                 result.judge_shown(self.scenario, *shown, moment, self._limit)
         served = self._serve(moment)
         observer.note(self._sensed, self._known_memory)
         if not observer.direct:
-            known = self._sensed, self._known_memory
-            result.observation = observer.read(*known, seats)
+            result.observation = self.observation()
             return
-        shown = {name: array.copy() for name, array in moment.shown.items()}
-        result.observation = observer.of_seats(shown, seats)
+        direct = {name: array.copy() for name, array in moment.shown.items()}
+        result.observation = observer.of_seats(direct, seats)
         if len(served):
             self._observe_again(result.observation, served)
 

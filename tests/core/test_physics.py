@@ -1,12 +1,15 @@
 """Physics that a world draws from, and the profiles."""
 
+import csv
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import marl_airhockey as ah
 from marl_airhockey.core.parameters import PARAMETERS, PRESETS
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.profiles import PROFILES, delay_of
+from marl_airhockey.core.profiles import PROFILES, RAMP, delay_of
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.table import GRAVITY
 
@@ -58,12 +61,27 @@ def test_profiles_do_not_change_seats():
 
 def test_the_delays_of_the_profiles_are_those_that_were_measured():
     low, high = delay_of(PROFILES["ur5e"])
-    assert 0.075 < low < 0.085
-    assert 0.165 < high < 0.175
-    assert delay_of(PROFILES["ur5e-authors"]) == pytest.approx((0.25, 0.35), abs=0.01)
+    assert low == pytest.approx(RAMP + 0.079, abs=1e-3)
+    assert high == pytest.approx(RAMP + 0.172, abs=1e-3)
+    authors = RAMP + np.array([0.25, 0.35])
+    assert delay_of(PROFILES["ur5e-authors"]) == pytest.approx(authors, abs=0.01)
     # Round trip of the gantry: 13.1 .. 22.0 ms, to which its loop adds up to 3.
-    assert delay_of(PROFILES["gantry"]) == pytest.approx((0.0134, 0.0247), abs=1e-3)
-    assert delay_of(PROFILES["ideal"]) == (0.0, 0.0)
+    gantry = RAMP + np.array([0.0134, 0.0247])
+    assert delay_of(PROFILES["gantry"]) == pytest.approx(gantry, abs=1e-3)
+    assert delay_of(PROFILES["ideal"]) == (RAMP, RAMP)
+
+
+def test_measured_answers_lie_within_the_delays_of_the_profiles():
+    path = Path(__file__).parents[2] / "docs/data/answer_times.csv"
+    with path.open() as file:
+        rows = {row["profile"]: row["answer_ms"] for row in csv.DictReader(file)}
+    assert set(rows) == set(PROFILES)
+    for name, answer in rows.items():
+        measured = [float(cell) for cell in answer.split(" .. ")]
+        low, high = (1000 * end for end in delay_of(PROFILES[name]))
+        # The slowest parts rarely come together.
+        assert low - 1 <= measured[0] < low + 10
+        assert high - 10 < measured[-1] <= high + 1
 
 
 def test_lively_rails_lose_little_with_speed():

@@ -56,7 +56,7 @@ def test_reward_success_and_compute_reward_agree(goal_scenario, profile):
     for _ in range(world.max_cycles):
         step = world.step(np.zeros((worlds, 0, 2)))
         wanted = game.desired(world.memory).astype(np.float32)
-        shown = game.achieved(world.sensed, world.memory).astype(np.float32)
+        shown = game.achieved(world.sensed, world.sensed_memory).astype(np.float32)
         achieved.append(shown)
         rewards.append(game.shown_reward(shown, wanted))
         true = game.achieved(world.state, world.memory).astype(np.float32)
@@ -69,15 +69,19 @@ def test_reward_success_and_compute_reward_agree(goal_scenario, profile):
     # Relabelled: what was achieved at any moment is a goal that it met there.
     late = np.array(achieved)
     counts = np.ones(late.shape[:2], bool)
-    if goal_scenario.startswith("hit"):
+    if goal_scenario != "reach_velocity":
         counts = late[..., -1] > 0.5
     np.testing.assert_array_equal(game.shown_reward(late, late) > 0, counts)
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-def test_rewards_are_those_of_the_observations(goal_scenario, profile):
+@pytest.mark.parametrize(
+    ("profile", "observe"),
+    [*((profile, "velocity") for profile in PROFILES), ("ur5e", "estimate")],
+)
+def test_rewards_are_those_of_the_observations(goal_scenario, profile, observe):
     """Of 10^4 steps of an environment, with paddles that go for goal or puck."""
-    env = ah.make_sb3_vec(goal_scenario, 50, goals="dict", profile=profile)
+    form = {"goals": "dict", "profile": profile, "observe": observe}
+    env = ah.make_sb3_vec(goal_scenario, 50, **form)
     env.seed(1)
     shown, rng, met = env.reset(), np.random.default_rng(0), 0
     target = "desired_goal" if goal_scenario.startswith("reach") else "achieved_goal"

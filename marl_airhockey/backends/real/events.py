@@ -51,9 +51,9 @@ def find_contacts(
         paddle: (n, 2) reported positions of the paddle, table frame, m.
     """
     table = scene.table
-    ends = [np.array([t.time, *t.place, *t.velocity]) for t in (before, after)]
+    first, last = (np.array([t.time, *t.place, *t.velocity]) for t in (before, after))
     near = table.puck_radius + table.paddle_radius
-    at = contact_time(*ends, times, paddle, near)
+    at = contact_time(first, last, times, paddle, near)
     moments = np.linspace(before.time, after.time, MOMENTS)
     on = before.place + (moments - before.time)[:, None] * before.velocity
     back = after.place + (moments - after.time)[:, None] * after.velocity
