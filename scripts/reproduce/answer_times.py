@@ -2,11 +2,11 @@
 
     python scripts/reproduce/answer_times.py --out docs/data/answer_times.csv
 
-In every episode a paddle at rest is commanded half of its top speed. The answer time is
-the age of what is sensed at some step, plus the time from the command until the paddle
-has half of this velocity: dead time, servo and acceleration. The worlds make 200 control
-steps a second, so that the velocity is known every 5 ms. The wait for the next decision,
-up to a control step, comes on top.
+In every episode a paddle at rest is commanded half of its top speed. The answer time
+is the age of what is sensed at some step, plus the time from the command until the
+paddle has half of this velocity: dead time, servo and acceleration. The worlds make 200
+control steps a second, so that the velocity is known every 5 ms. The wait for the next
+decision, up to a control step, comes on top.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import typer
 import marl_airhockey as ah
 from marl_airhockey.core.profiles import PROFILES
 from marl_airhockey.types import Array
+from marl_airhockey.world.world import World
 
 STEP, STEPS, SHARE = 0.005, 200, 0.5
 """Control step of the measurement, s, its number, and the action"""
@@ -56,8 +57,8 @@ def measure(profile: str, episodes: int) -> tuple[Array, Array]:
     return np.array(ages[-1]), half_times(np.array(speeds).T, world)
 
 
-def half_times(speeds: Array, world: ah.World) -> Array:
-    """Return the times at which speeds (episodes, steps) reach half of the command, s."""
+def half_times(speeds: Array, world: World) -> Array:
+    """Return the times at which speeds (episodes, steps) reach half a command, s."""
     half = 0.5 * SHARE * world.episode.physics["paddle_speed"]
     after = (speeds >= half[:, None]).argmax(1)
     rows = np.arange(len(speeds))
