@@ -24,9 +24,10 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Rally(Scenario):
-    """Game in which a crossing of the middle pays both 1 if it was struck from an end.
+    """Game in which a crossing of the middle pays both 1 if the puck comes from afar.
 
-    The puck must have been beyond ``depth`` in the half that it leaves. The seat there
+    The puck must have been beyond ``depth`` in the half that it leaves; it need not go
+    to the ends of the table. The seat there
     must have touched it last and must not be the one of the last counted crossing.
     Only distinct touches are strikes: a puck that both squeeze at the middle earns
     nothing. ``patience`` seconds without a counted crossing end the rally, and so does

@@ -103,19 +103,22 @@ class Reach(GoalScenario):
 
     @property
     def goal_bounds(self) -> tuple[float, ...]:
-        return (*self.table_geometry.size / 2, 1.0)
+        return (*self.table_geometry.size / 2, 1.5 * self.scene.seats[0].speed)
 
     def achieved(self, state: State, memory: Memory) -> Array:
-        rests = 1.0 * self._rests(memory)[..., None]
-        return np.concatenate([state.paddle[..., 0, :], rests], -1)
+        # A paddle that has not been at rest for long enough counts as moving.
+        speed = length(state.paddle_velocity[..., 0, :])
+        speed = np.where(self._rests(memory), 0.0, np.maximum(speed, 2.0 * self.speed))
+        return np.concatenate([state.paddle[..., 0, :], speed[..., None]], -1)
 
     def desired(self, memory: Memory) -> Array:
         goal = memory["goal"]
-        return np.concatenate([goal, np.ones((*goal.shape[:-1], 1))], -1)
+        return np.concatenate([goal, np.zeros((*goal.shape[:-1], 1))], -1)
 
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
         near = length(achieved[..., :2] - desired[..., :2]) < self.radius
-        return 1.0 * (near & (achieved[..., 2] > 0.5))
+        error = np.abs(achieved[..., 2] - desired[..., 2])
+        return 1.0 * (near & (error < self.speed))
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]

@@ -71,7 +71,7 @@ class ReachVelocity(GoalScenario):
             "goal_velocity": velocity,
             "gap": gap,
             "score": np.zeros(worlds),
-            "since": np.full(worlds, -np.inf),
+            "left": np.full(worlds, np.inf),
             "passed": np.zeros(worlds, np.bool_),
         }
 
@@ -79,12 +79,12 @@ class ReachVelocity(GoalScenario):
         gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
         error = length(t.after.paddle_velocity[..., 0, :] - t.memory["goal_velocity"])
         score = tolerance(gap, 0.0, 0.10) * tolerance(error, 0.0, 0.30)
-        since = t.memory["since"] + (t.after.time - t.before.time)
-        enters = np.isinf(since) & (gap < self.radius)
+        left = t.memory["left"] - (t.after.time - t.before.time)
+        enters = np.isinf(left) & (gap < self.radius)
         return {
             "gap": np.minimum(t.memory["gap"], gap),
             "score": np.maximum(t.memory["score"], score),
-            "since": np.where(enters, 0.0, since),
+            "left": np.where(enters, self.window, left),
             "passed": (gap < self.radius) & (error < self.error),
         }
 
@@ -110,7 +110,7 @@ class ReachVelocity(GoalScenario):
         }
 
     def terminated(self, t: Transition) -> Array:
-        over = t.new_memory["since"] >= self.window - 1e-9
+        over = t.new_memory["left"] < 1e-9
         return np.asarray(self.success(t) | over)
 
     def success(self, t: Transition) -> Array:

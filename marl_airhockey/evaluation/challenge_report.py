@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-PROTOCOL = 1
+PROTOCOL = 2
 """Raised whenever the challenge changes: cards of others are not comparable"""
 
 

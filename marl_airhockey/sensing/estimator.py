@@ -152,10 +152,7 @@ class Estimator:
         paddles: Array,
         now: Array,
     ) -> None:
-        """Do what `update` does, with the paths (W, n, S, 2) of paddles given.
-
-        The positions are a control step apart; the last one is that of now.
-        """
+        """Do what `update` does with paths (W, n, S, 2) of paddles, a step apart."""
         _update(
             *(worlds, seen, taken, fresh, paddles, now, self._known),
             *(self._mean, self._spread, self._taken, self._doubted),

@@ -55,7 +55,7 @@ def test_who_lost_all_lives_is_not_alive():
 
 
 def test_batches_tell_the_same_as_single_worlds():
-    many, one = ah.make_vec("reach", 3), gymnasium.make("marl_airhockey/Reach-v0")
+    many, one = ah.make_vec("reach", 3), gymnasium.make("marl_airhockey/Reach-v1")
     _, first = many.reset(seed=5)
     assert first.keys() == one.reset(seed=5)[1].keys() - {"is_success"}
     actions = np.random.default_rng(0).uniform(-1, 1, (20, 3, 2)).astype(np.float32)

@@ -39,7 +39,7 @@ def test_every_number_of_state_and_observation_has_a_name():
     labels = env.observation_labels("paddle_0")
     assert ah.make_sb3_vec("duel", 2).observation_labels == labels
     single, many = ah.parallel_env("reach"), ah.make_vec("reach", 2)
-    task = gymnasium.make("marl_airhockey/Reach-v0").unwrapped
+    task = gymnasium.make("marl_airhockey/Reach-v1").unwrapped
     own = single.observation_labels("paddle_0")
     assert many.observation_labels == task.observation_labels == own
     assert len(own) == task.observation_space.shape[0]

