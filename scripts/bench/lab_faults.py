@@ -7,7 +7,8 @@ switched on. Printed are the reason with which the episode ends, the time until 
 until the true paddle rests for good (below 0.01 m/s), and how far it moved on after the
 episode's end. "plays on" is for what ends no episode within the time that is listened.
 It takes about 25 minutes, with ``--alone`` four, in real time: nothing else should run
-meanwhile.
+meanwhile. Faults whose rows are in the file are not measured again, so the script can
+be stopped and started; ``--summary`` prints the pairs of the file by reason.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import re
 import time
-from collections import Counter
 from contextlib import closing
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -126,17 +127,54 @@ def show(row: dict[str, object]) -> None:
     print(f"| {' | '.join(cells)} |", flush=True)
 
 
+def summary_of(rows: list[dict[str, Any]]) -> list[dict[str, str]]:
+    """Return the number of pairs for each reason of an end, and their worst numbers."""
+    pairs: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        if "+" in row["faults"]:
+            reason = re.sub(r" for [\d.]+ s$", "", row["reason"]) or "plays on"
+            pairs.setdefault(reason, []).append(row)
+
+    def worst(found: list[dict[str, Any]], column: str) -> str:
+        numbers = [row[column] for row in found if row[column] is not None]
+        return f"{1e3 * max(numbers):.0f}" if numbers else ""
+
+    return [
+        {
+            "reason of the end": reason,
+            "pairs": str(len(found)),
+            "episode ends, ms": worst(found, "ended_s"),
+            "at rest, ms": worst(found, "rest_s"),
+            "moved on, mm": worst(found, "moved_m"),
+        }
+        for reason, found in sorted(pairs.items())
+    ]
+
+
+def print_summary(rows: list[dict[str, Any]]) -> None:
+    """Print the table of the pairs."""
+    table = summary_of(rows)
+    for cells in ([*table[0]] if table else [], *([*row.values()] for row in table)):
+        print(f"| {' | '.join(cells)} |")
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--alone", action="store_true", help="leave out pairs")
     parser.add_argument("--out", type=Path, help="file for the rows, JSON")
+    parser.add_argument("--summary", type=Path, help="print the pairs of this file")
     given = parser.parse_args()
+    if given.summary:
+        print_summary(json.loads(given.summary.read_text()))
+        return
     names = [name for name in (*ARM_FAULTS, *TABLE_FAULTS) if name != QUIET]
     groups: list[tuple[str, ...]] = [(name,) for name in names]
     if not given.alone:
         groups += itertools.combinations(names, 2)
-    rows, seeds = [], itertools.count(1)
+    known = given.out is not None and given.out.exists()
+    rows = json.loads(given.out.read_text()) if known else []
+    done, seeds = {row["faults"] for row in rows}, itertools.count(1 + len(rows))
     print("| faults | reason | episode ends, ms | at rest, ms | moved on, mm |")
     print("| --- | --- | --- | --- | --- |")
     with Lab() as lab, served(lab, announce=False) as port:
@@ -148,14 +186,16 @@ def main() -> None:
         world = build_driven_world(policy, "juggle", 1, keywords)
         try:
             for group in groups:
+                if " + ".join(group) in done:
+                    continue
                 rows.append(measure(lab, world, group, seeds))
                 show(rows[-1])
+                if given.out:
+                    given.out.write_text(json.dumps(rows, indent=1) + "\n")
         finally:
             world.close()
             path.unlink()
-    print(Counter(str(row["reason"]) for row in rows))
-    if given.out:
-        given.out.write_text(json.dumps(rows, indent=1) + "\n")
+    print_summary(rows)
 
 
 if __name__ == "__main__":
