@@ -118,7 +118,8 @@ class Reach(GoalScenario):
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
         near = length(achieved[..., :2] - desired[..., :2]) < self.radius
         error = np.abs(achieved[..., 2] - desired[..., 2])
-        return np.asarray(1.0 * (near & (error < self.speed)))
+        met: Array = 1.0 * (near & (error < self.speed))
+        return met
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         return [Mark.circle(memory["goal"], self.radius)]
