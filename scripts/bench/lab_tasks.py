@@ -1,0 +1,96 @@
+"""Measure how well policies do the five real tasks through the lab's camera and arm.
+
+    python scripts/bench/lab_tasks.py --out docs/data/lab_tasks.csv
+
+Each policy of the zoo for the full-size table plays 20 episodes through camera and arm,
+in real time, and 1000 on the plant alone: the same table with the same physics, but the
+true state and a paddle that follows exactly. The profile `ur5e` is the simulation that
+it was trained in. 95 % intervals. It takes about 15 minutes; nothing else should run
+meanwhile. Tasks whose rows are in the file are not measured again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from contextlib import closing
+from pathlib import Path
+
+from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
+from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
+from marl_airhockey.lab.lab import Lab, LabClient, served
+from marl_airhockey.sensing.simulated_camera import SENSED
+
+TASKS = ("reach", "reach_velocity", "touch", "juggle", "puck_velocity")
+EXACT = (*SENSED, "action_delay", "servo_time")
+"""Parameters that are 0 for the plant alone"""
+EPISODES, SIMULATED = 20, 1000
+"""Episodes through the lab, and of each simulation"""
+
+
+def shown(result: EvaluationResult, digits: int) -> str:
+    """Return a success with its interval."""
+    low, high = result.success_interval
+    return f"{result.success:.{digits}f} ({low:.{digits}f} .. {high:.{digits}f})"
+
+
+def measure(task: str, rig: Path, physics: dict[str, float]) -> dict[str, str]:
+    """Return the row of a task.
+
+    Args:
+        task: Name of the task.
+        rig: File of the lab's rig.
+        physics: Parameters of the lab's table.
+    """
+    policy, options = f"zoo/{task}_full_size", {"table": "full_size"}
+    lab = evaluate(policy, task, episodes=EPISODES, backend="real", rig=str(rig))
+    plant = evaluate(
+        policy,
+        task,
+        episodes=SIMULATED,
+        options=options,
+        profile="ideal",
+        physics=physics,
+    )
+    simulated = evaluate(
+        policy, task, episodes=SIMULATED, options=options, profile="ur5e"
+    )
+    return {
+        "task": task,
+        "lab": shown(lab, 2),
+        "interrupted": str(lab.interrupted),
+        "plant": shown(plant, 3),
+        "ur5e": shown(simulated, 3),
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--out", type=Path, required=True, help="file of the rows, CSV")
+    out = parser.parse_args().out
+    rows: list[dict[str, str]] = []
+    if out.exists():
+        with out.open() as file:
+            rows = list(csv.DictReader(file))
+    known = {row["task"] for row in rows}
+    with Lab() as lab, served(lab, announce=False) as port:
+        path = cache_folder() / f"tasks-{port}.json"
+        with closing(LabClient(port)) as client:
+            calibrate_lab(client).save(path)
+        physics = lab.ask({"do": "truth"})["laws"] | dict.fromkeys(EXACT, 0.0)
+        for task in TASKS:
+            if task in known:
+                continue
+            rows.append(measure(task, path, physics))
+            print(rows[-1], flush=True)
+            with out.open("w", newline="") as file:
+                table = csv.DictWriter(file, [*rows[0]], lineterminator="\n")
+                table.writeheader()
+                table.writerows(rows)
+        path.unlink()
+
+
+if __name__ == "__main__":
+    main()
