@@ -53,6 +53,21 @@ def split(
     show(divided(recording, out, test, seed), False)
 
 
+def relabel(
+    recording: Annotated[Path, typer.Argument(help="Recording.")],
+    out: Annotated[Path, typer.Option(help="Folder of the new recordings.")],
+    task: Annotated[
+        list[str] | None,
+        typer.Option(help="Scenario, repeatable; all that fit if none is given."),
+    ] = None,
+) -> None:
+    """Write a recording as data of other tasks with the same bodies, by name."""
+    from marl_airhockey.data.relabel import fitting, relabelled
+
+    names = task or fitting(recording)
+    show([relabelled(recording, name, out / name) for name in names], False)
+
+
 def convert(
     files: Annotated[
         list[Path], typer.Argument(help="Files of former versions, *.rec.")
@@ -140,5 +155,5 @@ def import_dataset(
     show([import_minari(name, scenario, out, control_dt, root)], False)
 
 
-COMMANDS = (repair, merge, split, convert, extract, export)
+COMMANDS = (repair, merge, split, convert, relabel, extract, export)
 """Functions of the commands but `import`, whose name is a word of Python"""

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.physics import load_physics
 from marl_airhockey.core.recording import Columns, RecordedEpisode, Recording
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
@@ -22,7 +23,12 @@ from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.world import World
 
 STATE, SENSED, MEMORY, TERM = "state.", "sensed.", "memory.", "term."
+JUDGED = "judged."
 """Beginnings of the names of columns"""
+SHARED = ("seats", "goals")
+"""Keywords of environments that are options of all scenarios"""
+PATH = "path"
+"""Field of the states of scenes that need it"""
 SEEN = ("position", "velocity", "visible")
 """Fields of the sensed state that are kept"""
 
@@ -35,16 +41,23 @@ def head_of(world: World, keywords: Keywords) -> dict[str, Any]:
         "options": dict(keywords.get("options", {})),
         "backend": keywords.get("backend", DEFAULT_BACKEND),
         "profile": keywords.get("profile", "ideal"),
+        "physics": _physics(keywords),
         "control_dt": world.control_dt,
         "max_cycles": world.max_cycles,
         "observe": world.observer.observe,
-        **({"goals": keywords["goals"]} if "goals" in keywords else {}),
+        **{name: keywords[name] for name in SHARED if name in keywords},  # type: ignore[literal-required]
         **_rig(keywords),
         "versions": {
             "marl_airhockey": metadata.version("marl_airhockey"),
             "python": platform.python_version(),
         },
     }
+
+
+def _physics(keywords: Keywords) -> Any:
+    """Return the physics that keywords name, whole: a file may change."""
+    given = keywords.get("physics")
+    return load_physics(given) if isinstance(given, (str, Path)) else given
 
 
 def _rig(keywords: Keywords) -> dict[str, Any]:
@@ -73,6 +86,8 @@ def first_columns(world: World) -> Columns:
     """Return the columns (B, ...) of what is there now: state, memory, observation."""
     state = world.state
     columns = {STATE + name: getattr(state, name) for name in RESULTS}
+    if state.path is not None:
+        columns[STATE + PATH] = state.path
     if not world.sensor.ideal:
         sensed = world.sensed
         columns |= {SENSED + name: getattr(sensed, name) for name in SEEN}
@@ -98,8 +113,17 @@ def step_columns(world: World) -> Columns:
         **{TERM + name: value for name, value in world.terms.items()},
         "returns": episode.returns,
         "success": episode.success,
+        **_judged(world),
         **_devices(world),
     }
+
+
+def _judged(world: World) -> Columns:
+    """Return the states that the rules judged, in games that serve after it."""
+    if not world.serves:
+        return {}
+    judged = world.judged
+    return {JUDGED + name: getattr(judged, name) for name in RESULTS}
 
 
 def _devices(world: World) -> Columns:
@@ -120,7 +144,10 @@ def scenario_of(recording: Recording) -> Scenario:
     """
     head = recording.head
     try:
-        scenario = make_scenario(head["scenario"], **head.get("options", {}))
+        shared = {name: head[name] for name in SHARED if name in head}
+        scenario = make_scenario(
+            head["scenario"], **{**head.get("options", {}), **shared}
+        )
     except (ValueError, TypeError) as error:
         raise ValueError(f"{recording.path}: {error}") from error
     bodies = len(scenario.scene.bodies)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.recording import FILM, PLAYED, Columns
 from marl_airhockey.data.columns import (
+    EpisodeNotes,
     episode_notes,
     first_columns,
     head_of,
@@ -22,6 +23,7 @@ from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Film
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_driven_world
 from marl_airhockey.world.world import World
 
@@ -147,9 +149,29 @@ def _record(world: World, writer: RecordingWriter, count: int) -> None:
         rows.append(step_columns(world))
         if result.interruption:
             reasons[0] = result.interruption
+    write_episodes(writer, first, rows, length, notes, reasons)
+
+
+def write_episodes(
+    writer: RecordingWriter,
+    first: Columns,
+    rows: Sequence[Columns],
+    lengths: Array,
+    notes: Sequence[EpisodeNotes],
+    reasons: Sequence[str],
+) -> None:
+    """Write episodes that were played side by side.
+
+    Args:
+        writer: Writer of a recording.
+        first: Columns (B, ...) before the first step.
+        rows: Columns (B, ...) after each step.
+        lengths: (B,) number of steps of each episode.
+        notes: Seed and physics of those that are written, the first of the B.
+        reasons: Reason of the end of each of these.
+    """
     whole = {name: np.stack([row[name] for row in rows], 1) for name in rows[0]}
-    for i in range(count):
-        begun = {name: value[i] for name, value in first.items()}
-        writer.begin(begun, *notes[i])
-        writer.add_rows({n: value[i, : length[i]] for n, value in whole.items()})
-        writer.end(reasons[i])
+    for i, (note, reason) in enumerate(zip(notes, reasons, strict=True)):
+        writer.begin({name: value[i] for name, value in first.items()}, *note)
+        writer.add_rows({n: value[i, : lengths[i]] for n, value in whole.items()})
+        writer.end(reason)

@@ -95,7 +95,7 @@ class World:
         self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
-        self._sensed = self._known = self._state
+        self._sensed = self._known = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
         self.closed = False
@@ -105,6 +105,16 @@ class World:
     def state(self) -> State:
         """True state, table frame; freshly allocated."""
         return self._state.map(np.copy)
+
+    @property
+    def judged(self) -> State:
+        """State that the rules judged in the last step, before serves; a copy."""
+        return self._judged.map(np.copy)
+
+    @property
+    def serves(self) -> bool:
+        """True if the rules of the game serve pucks."""
+        return "serves" in self._built.now.verdict.outcome
 
     @property
     def sensed(self) -> State:
@@ -218,6 +228,18 @@ class World:
         self.reset_worlds(np.arange(self.num_worlds))
         return self.observation()
 
+    def begin(self, rows: State | None, numbers: Array) -> None:
+        """Begin given episodes everywhere, such as recorded ones; see `seed`.
+
+        Args:
+            rows: States (B, ...) in which they begin; None for those that the scenario
+                samples.
+            numbers: (B,) numbers of the episodes since the worlds had their seeds, from
+                1; each has random streams of its own.
+        """
+        self._episode.number[:] = numbers - 1
+        self.draw_worlds(np.arange(self.num_worlds), rows)
+
     def reset_worlds(self, worlds: Array) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
         rng = self.draw_worlds(worlds)
@@ -229,9 +251,10 @@ class World:
         for seat in self.driven:
             seat.reset(worlds, self.seeds, self._episode.number)
 
-    def draw_worlds(self, worlds: Array) -> RandomStreams:
+    def draw_worlds(self, worlds: Array, rows: State | None = None) -> RandomStreams:
         """Draw how a new episode begins in some worlds, by index (W,).
 
+        If states are given as ``rows``, it begins with these.
         On a real table, where somebody has still to bring it about, that is all.
         Returns the streams from which the start is drawn.
         """
@@ -244,8 +267,11 @@ class World:
             self.backend.set_physics(self._episode.physics, changed)
         self._key_scatter(worlds)
         rng = self._streams.of("start", worlds)
-        state, memory = self.scenario.reset(rng, len(worlds))
-        self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
+        if rows is None:
+            rows, memory = self.scenario.reset(rng, len(worlds))
+        else:
+            memory = self.scenario.initial_memory(rows, rng)
+        self._begin(worlds, rows, self._aimed(rng, rows, memory, worlds))
         return rng
 
     def set_state(
@@ -329,7 +355,8 @@ class World:
         return self._memory if self._follower is None else self._follower.now
 
     def _adopt(self, moment: Moment) -> None:
-        self._state, self._memory = moment.state, moment.verdict.memory
+        self._state = self._judged = moment.state
+        self._memory = moment.verdict.memory
         self._episode = moment.episode
 
     @property
@@ -410,7 +437,7 @@ class World:
         # count_nonzero: for few worlds, `any` costs as much as the physics.
         if serves is None or not np.count_nonzero(serves):
             return NOWHERE
-        worlds = np.flatnonzero(serves)
+        worlds, self._judged = np.flatnonzero(serves), self.state
         # `take` is several times faster than an index.
         rows = self._state.map(lambda x: x.take(worlds, 0))
         memory = {name: x.take(worlds, 0) for name, x in self._memory.items()}

@@ -1,0 +1,222 @@
+"""Replay: recorded episodes as worlds, to compute again what a rule makes of them.
+
+The states are those of the recording; all that follows from them is computed by the
+same code as in play: memory, reward terms, ends, sensing, observations. So a recording
+of one task becomes data of another with the same bodies, and old rewards can be checked
+against the rules of today.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from marl_airhockey.contracts.backend import Backend, Command
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.recording import RecordedEpisode, Recording
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import RESULTS, State
+from marl_airhockey.data.columns import JUDGED, PATH, STATE, scenario_of, states_of
+from marl_airhockey.jit.pipeline import Stage
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.types import Array
+from marl_airhockey.world.step_result import StepResult
+from marl_airhockey.world.world import World
+
+
+class ReplayBackend(Backend):
+    """Backend that returns recorded states, whatever is commanded.
+
+    Args:
+        scene: Scene of the episodes.
+        control_dt: Time of a step, s.
+        states: Judged states (T, B, ...) after each step, of B episodes.
+    """
+
+    timestep: ClassVar[float | None] = None
+
+    def __init__(self, scene: Scene, control_dt: float, states: State) -> None:
+        super().__init__(scene, states.time.shape[1], control_dt)
+        self._states, self._due = states, 0
+
+    @property
+    def left(self) -> int:
+        """Number of steps that are left."""
+        return len(self._states.time) - self._due
+
+    def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
+        """Do nothing: the states are known."""
+
+    def stage(self, command: Command, before: State, after: State) -> Stage:
+        return Stage(self._fill, (after,))
+
+    def _fill(self, after: State) -> None:
+        for name in RESULTS:
+            getattr(after, name)[:] = getattr(self._states, name)[self._due]
+        if after.path is not None and self._states.path is not None:
+            after.path[:] = self._states.path[self._due]
+        self._due += 1
+
+
+class ArmReplayBackend(ReplayBackend):
+    """The same for recordings in which arms moved the paddles."""
+
+    instant_contacts: ClassVar[bool] = False
+    tracks_commands: ClassVar[bool] = False
+
+
+class RecordedPhysics(Physics):
+    """Physics whose values are those of recorded episodes.
+
+    Args:
+        like: Physics that they were sampled from.
+        values: Values (B,) by name.
+    """
+
+    def __init__(self, like: Physics, values: dict[str, Array]) -> None:
+        vars(self).update(vars(like))
+        self._values = values
+
+    def draw(self, rng: RandomStreams) -> dict[str, Array]:
+        """Return the recorded values; B worlds are to begin together."""
+        return {name: value.copy() for name, value in self._values.items()}
+
+
+class Replay:
+    """Replay of B recorded episodes side by side.
+
+    With the recorded scenario, memory, rewards and observations become the recorded
+    ones. With another one, an episode begins with the recorded state; goals are sampled
+    with the recorded seed.
+
+    Args:
+        recording: Recording with the episodes, which all have steps.
+        scenario: Scenario whose rules are applied; None for the recorded one.
+
+    Raises:
+        ValueError: Another scene than that of the recording, or something is missing
+            that the scenario needs; named.
+    """
+
+    def __init__(self, recording: Recording, scenario: Scenario | None = None) -> None:
+        head, episodes = recording.head, recording.episodes
+        own = scenario_of(recording)
+        self.scenario = game = scenario or own
+        self._same = game == own
+        _check_scene(game, own)
+        states = [states_of(episode, game) for episode in episodes]
+        self.lengths = np.array([len(episode) for episode in episodes])
+        """(B,) number of steps of each episode"""
+        self._first = _stacked([state.map(lambda x: x[0]) for state in states], 0)
+        judged = [
+            judged_states(e, s, game) for e, s in zip(episodes, states, strict=True)
+        ]
+        steps = int(self.lengths.max())
+        all_steps = _stacked([_padded(state, steps) for state in judged], 1)
+        played = find_backend(head.get("backend", DEFAULT_BACKEND))
+        kind = ReplayBackend if played.tracks_commands else ArmReplayBackend
+        backend = kind(game.scene, float(head["control_dt"]), all_steps)
+        self._actions = np.stack(
+            [_padded_rows(e.columns["action"], steps) for e in episodes], 1
+        )
+        physics = _physics(head, episodes, game, played)
+        form = str(head.get("observe", "velocity"))
+        cycles = int(head["max_cycles"]) if self._same else None
+        self.world = World(game, backend, {}, physics, (form,), cycles, autoreset=False)
+        """Worlds of the episodes, all seats open"""
+        self._seeds = [episode.seed or 0 for episode in episodes]
+        self._numbers = np.array([episode.number for episode in episodes])
+
+    def begin(self) -> None:
+        """Begin all episodes."""
+        world = self.world
+        world.seed(self._seeds)
+        world.begin(None if self._same else self._first, self._numbers)
+
+    def step(self, t: int) -> StepResult:
+        """Make step t (from 0); episodes that have ended keep their last state."""
+        return self.world.step(self._actions[t])
+
+
+def judged_states(episode: RecordedEpisode, states: State, scenario: Scenario) -> State:
+    """Return the states (T, ...) that the rules judged: those before serves.
+
+    Args:
+        episode: Episode of T steps.
+        states: Its states (T + 1, ...).
+        scenario: Scenario that is applied to it.
+
+    Raises:
+        ValueError: The scenario needs the path of the puck within a step, and the
+            recording does not have it.
+    """
+    after = states.map(lambda x: x[1:])
+    names = {name: episode.columns.get(JUDGED + name) for name in RESULTS}
+    known = {name: value for name, value in names.items() if value is not None}
+    after = replace(after, **known)  # type: ignore[arg-type]
+    if not scenario.scene.path:
+        return after
+    path = episode.columns.get(STATE + PATH)
+    if path is None:
+        raise ValueError(
+            f"{scenario.name} needs the path of the puck within a step, which "
+            "recordings of other scenarios do not have"
+        )
+    return replace(after, path=path)
+
+
+def _check_scene(game: Scenario, own: Scenario) -> None:
+    """Refuse a scenario that cannot be played on the recorded table."""
+    new, old = game.scene, own.scene
+    for name in ("table", "seats", "goal_lines", "bodies"):
+        if getattr(new, name) != getattr(old, name):
+            raise ValueError(
+                f"{game.name}: its {name.replace('_', ' ')} differ from those of the "
+                f"recorded scenario {own.name}"
+            )
+
+
+def _physics(
+    head: dict[str, object],
+    episodes: Sequence[RecordedEpisode],
+    game: Scenario,
+    played: type[Backend],
+) -> Physics:
+    """Return the physics of episodes, and the ranges that they were sampled from.
+
+    Of a real table nothing is simulated again: its states are measured.
+    """
+    profile, given = str(head.get("profile", "ideal")), head.get("physics")
+    arms, real = not played.tracks_commands, played.senses_itself
+    like = Physics(game.scene.defaults, profile, given, arms=arms, real=real)  # type: ignore[arg-type]
+    values = {
+        name: np.array([episode.physics[name] for episode in episodes])
+        for name in episodes[0].physics
+    }
+    return RecordedPhysics(like, values)
+
+
+def _padded_rows(rows: Array, count: int) -> Array:
+    """Return rows (T, ...) with the last one repeated up to a count."""
+    return np.concatenate([rows, np.repeat(rows[-1:], count - len(rows), 0)])
+
+
+def _padded(states: State, count: int) -> State:
+    """Return states (T, ...) with the last one repeated up to a count."""
+    return states.map(lambda x: _padded_rows(x, count))
+
+
+def _stacked(states: list[State], axis: int) -> State:
+    """Return states of B episodes as one, with an axis for them."""
+    fields = {
+        name: np.stack([getattr(state, name) for state in states], axis)
+        for name in (*RESULTS, "visible")
+    }
+    paths = [state.path for state in states if state.path is not None]
+    path = np.stack(paths, axis) if paths else None
+    return replace(states[0], path=path, **fields)  # type: ignore[arg-type]
