@@ -51,13 +51,12 @@ def relabelled(
         ValueError: The scenario has other bodies, or needs what was not recorded.
     """
     head = read_head(path)
-    old = {**head.get("options", {}), **head}
-    kept = {name: old[name] for name in ("table", "seats") if name in old}
-    game = make_scenario(scenario, **{**kept, **(options or {})})
+    chosen = {**_table_of(head), **(options or {})}
+    game = make_scenario(scenario, **chosen)
     new = {
         **{k: v for k, v in head.items() if k not in LEFT_OUT},
         "scenario": game.name,
-        "options": {**kept, **(options or {})},
+        "options": chosen,
         "max_cycles": round(game.seconds / float(head["control_dt"])),
         "relabelled_from": head["scenario"],
     }
@@ -65,6 +64,12 @@ def relabelled(
         for batch in _batches(episodes_of(path)):
             _write(Recording(path, head, batch), game, writer)
     return out
+
+
+def _table_of(head: dict[str, Any]) -> dict[str, Any]:
+    """Return the options that a recording shares with all scenarios at its table."""
+    known = {**head.get("options", {}), **head}
+    return {name: known[name] for name in ("table", "seats") if name in known}
 
 
 def fitting(path: Path) -> list[str]:
@@ -76,7 +81,7 @@ def fitting(path: Path) -> list[str]:
     recording, names = Recording(path, head, [first]), []
     for name in scenario_names():
         try:
-            Replay(recording, make_scenario(name))
+            Replay(recording, make_scenario(name, **_table_of(head)))
         except ValueError:
             continue
         names.append(name)

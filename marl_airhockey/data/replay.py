@@ -44,11 +44,6 @@ class ReplayBackend(Backend):
         super().__init__(scene, states.time.shape[1], control_dt)
         self._states, self._due = states, 0
 
-    @property
-    def left(self) -> int:
-        """Number of steps that are left."""
-        return len(self._states.time) - self._due
-
     def set_physics(self, values: dict[str, Array], worlds: Array) -> None:
         """Do nothing: the states are known."""
 

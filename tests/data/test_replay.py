@@ -124,7 +124,7 @@ def test_relabelled_play_ends_by_the_new_rules(tmp_path):
 
 
 def test_all_tasks_that_fit_are_relabelled_in_one_command(tmp_path):
-    recorded(tmp_path / "juggle", "juggle", episodes=2)
+    recorded(tmp_path / "juggle", "juggle", 2, options={"table": "full_size"})
     found = fitting(tmp_path / "juggle")
     assert {"juggle", "touch", "puck_velocity"} <= set(found)
     assert not {"reach", "duel", "move_block", "hit_goal"} & set(found)
