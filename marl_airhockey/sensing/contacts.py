@@ -17,8 +17,6 @@ MOMENTS = 9
 """Number of times between two frames at which the paths are checked"""
 MARGIN = 0.004
 """Largest gap that counts as a contact, m, for errors of calibration and noise"""
-PAST = 0.4
-"""Time for which the paths of paddles are kept, s"""
 
 
 class ContactSensor:
@@ -35,26 +33,23 @@ class ContactSensor:
         self._near, self._dt = table.puck_radius + table.paddle_radius, control_dt
         self._tracks = np.zeros((worlds, bodies.pucks, 5))
         """Last frame of each puck: time, s, x, y, m, vx, vy, m/s"""
-        kept = max(round(PAST / control_dt), 2)
-        self._paddles = np.zeros((worlds, kept, bodies.paddles, 2))
         pairs = worlds, bodies.paddles, bodies.pucks
         self.touched = np.zeros(pairs, np.int64)
         """(B, paddles, pucks) number of contacts that began, as in `State`"""
         self.touched_at = np.full(pairs, np.nan)
-        """(B, paddles, pucks) their time into the step, s, negative as they are seen
-        late; nan without any"""
+        """(B, paddles, pucks) their time into the step, s, negative where it was before
+        the step; nan without any"""
         self.touching = np.zeros(pairs, np.bool_)
         """(B, paddles, pucks) True if in contact in the newest frame"""
 
-    def reset(self, worlds: Array, tracks: Array, paddles: Array) -> None:
+    def reset(self, worlds: Array, tracks: Array) -> None:
         """Forget all contacts in some worlds, by index.
 
         Args:
             worlds: Indices (W,) of the worlds.
             tracks: (W, pucks, 5) time, s, position, m, velocity, m/s, in a frame.
-            paddles: Positions (W, S, 2) of the paddles, m.
         """
-        self._tracks[worlds], self._paddles[worlds] = tracks, paddles[:, None]
+        self._tracks[worlds] = tracks
         self.touched[worlds], self.touched_at[worlds] = 0, np.nan
         self.touching[worlds] = False
 
@@ -63,16 +58,14 @@ class ContactSensor:
 
         Args:
             tracks: (W, pucks, 5) time, s, position, m, velocity, m/s, in the frames.
-            paddles: Positions (W, S, 2) of the paddles now, m.
+            paddles: Paths (W, n, S, 2) of the paddles, a control step apart, the last
+                position that of now, m.
             now: Times (W,) now, s.
             rows: The W worlds.
         """
-        past = self._paddles[rows]
-        past[:, :-1], past[:, -1] = past[:, 1:].copy(), paddles
-        self._paddles[rows] = past
         worlds = np.arange(len(self._tracks))[rows]
         state = self._tracks, self.touched, self.touched_at, self.touching
-        _update(worlds, tracks, past, now, self._near, self._dt, *state)
+        _update(worlds, tracks, paddles, now, self._near, self._dt, *state)
 
 
 @compiled(nogil=True, error_model="numpy")

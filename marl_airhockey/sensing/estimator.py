@@ -20,8 +20,6 @@ from marl_airhockey.types import Array
 
 STEP = 0.01
 """Longest step of a prediction, s"""
-PAST = 0.4
-"""Time for which the paths of paddles are kept, s"""
 DRIFT = 0.5
 """Noise of the acceleration, m/s2, for errors of the model: unknown slopes and a
 calibration error that depends on the position. Like the next two, it has the least
@@ -96,8 +94,6 @@ class Estimator:
         """At the last frame: x, y, vx, vy, speed of the edge; variance of the position,
         covariance and variance of the velocity, the same along either axis"""
         self._taken, self._doubted = np.zeros(shape), np.zeros(shape, np.bool_)
-        kept = max(round(PAST / control_dt), 2)
-        self._paddles = np.zeros((worlds, kept, bodies.paddles, 2))
         self.now = np.zeros((*shape, 5))
         """(B, pucks, 5) estimates for now: x, y, m, vx, vy, speed of the edge, m/s"""
 
@@ -106,10 +102,8 @@ class Estimator:
         """(B, pucks, 5) time, s, x, y, m, vx, vy, m/s, at each puck's last frame."""
         return np.concatenate([self._taken[..., None], self._mean[..., :4]], -1)
 
-    def reset(
-        self, worlds: Array, seen: Array, velocity: Array, taken: Array, paddles: Array
-    ) -> None:
-        """Reset worlds (W,) to pucks with some velocity, and paddles at rest.
+    def reset(self, worlds: Array, seen: Array, velocity: Array, taken: Array) -> None:
+        """Reset worlds (W,) to pucks with some velocity.
 
         The pucks were ``seen`` (W, pucks, 2), m, at the times ``taken`` (W, pucks), s.
         """
@@ -117,7 +111,6 @@ class Estimator:
         self._mean[worlds, :, :2], self._mean[worlds, :, 2:4] = seen, velocity
         self._spread[worlds] = self._known.noise, 0.0, FIRST**2
         self._taken[worlds], self._doubted[worlds] = taken, False
-        self._paddles[worlds] = paddles[:, None]
 
     def update(
         self,
@@ -135,24 +128,10 @@ class Estimator:
             seen: Positions (W, pucks, 2) in the frame, m.
             taken: Times (W,) of the frame, s.
             fresh: (W, pucks) bool, True for pucks that are visible in a new frame.
-            paddles: Positions (W, S, 2) of the paddles now, m.
+            paddles: Paths (W, n, S, 2) of the paddles, a control step apart, the last
+                position that of now, m.
             now: Times (W,) now, s.
         """
-        past = self._paddles[worlds]
-        past[:, :-1], past[:, -1] = past[:, 1:].copy(), paddles
-        self._paddles[worlds] = past
-        self.update_along(worlds, seen, taken, fresh, past, now)
-
-    def update_along(
-        self,
-        worlds: Array,
-        seen: Array,
-        taken: Array,
-        fresh: Array,
-        paddles: Array,
-        now: Array,
-    ) -> None:
-        """Do what `update` does with paths (W, n, S, 2) of paddles, a step apart."""
         _update(
             *(worlds, seen, taken, fresh, paddles, now, self._known),
             *(self._mean, self._spread, self._taken, self._doubted),

@@ -23,6 +23,8 @@ SENSED = (
     *("calibration_error", "occlusion", "false_detection"),
 )
 """Names of the physical parameters of sensing."""
+PAST = 0.4
+"""Time for which the paths of paddles are stored, s"""
 SAME_FRAME = 1e-4
 """Largest time between two readings of the same frame (s)."""
 
@@ -72,6 +74,8 @@ class SimulatedCamera:
         estimator = Estimator(scene, num_worlds, physics, control_dt)
         self._estimator = estimator if estimates else None
         self._contacts = ContactSensor(scene, num_worlds, control_dt)
+        stored = max(round(PAST / control_dt), 2)
+        self._paddles = np.zeros((num_worlds, stored, scene.bodies.paddles, 2))
         self._position, self._velocity = np.zeros(shape), np.zeros(shape)
         self._taken = np.zeros((num_worlds, count))
         """Time of the last frame in which a body was visible, s"""
@@ -116,9 +120,9 @@ class SimulatedCamera:
                 self._position[worlds, pucks],
                 velocity[:, pucks],
                 self._taken[worlds, pucks],
-                state.paddle[worlds],
             )
-        self._contacts.reset(worlds, self._tracks[worlds], state.paddle[worlds])
+        self._contacts.reset(worlds, self._tracks[worlds])
+        self._paddles[worlds] = state.paddle[worlds, None]
 
     @property
     def estimates(self) -> bool:
@@ -219,6 +223,9 @@ class SimulatedCamera:
         self._position[rows] = np.where(fresh[..., None], seen, last)
         self._taken[rows] = np.where(fresh, taken, self._taken[rows])
         self._visible[rows] = found
+        paddles = self._paddles[rows]
+        paddles[:, :-1], paddles[:, -1] = paddles[:, 1:].copy(), state.paddle[rows]
+        self._paddles[rows] = paddles
         if self._estimator is not None:
             # Contiguous with and without blocks, so that one version is compiled.
             pucks_of = slice(0, self.pucks)
@@ -227,11 +234,10 @@ class SimulatedCamera:
                 np.ascontiguousarray(seen[:, pucks_of]),
                 taken[:, 0],
                 np.ascontiguousarray(fresh[:, pucks_of]),
-                state.paddle[rows],
+                paddles,
                 state.time[rows],
             )
-        tracks = self._tracks[rows]
-        self._contacts.update(tracks, state.paddle[rows], state.time[rows], rows)
+        self._contacts.update(self._tracks[rows], paddles, state.time[rows], rows)
 
 
 def _past(position: Array, velocity: Array, steps: int, control_dt: float) -> Array:

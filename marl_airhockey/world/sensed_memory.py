@@ -30,7 +30,7 @@ class SensedMemory:
     def begin(self, worlds: Array, memory: Memory) -> None:
         """Take the true memory in some worlds, by index, where an episode begins.
 
-        The same holds for a serve, with which the referee tells what has happened.
+        The same holds for a serve, with which the referee announces what has happened.
         """
         for name, array in memory.items():
             mine = self.now.setdefault(name, array.copy())

@@ -3,7 +3,7 @@
     python scripts/bench/lab_latency.py --out docs/data/lab_latency.csv
 
 The whole pipeline runs in real time: camera, vision, filter, policy, driver, emulated
-controller. Three times are measured and put beside those that the profile `ur5e`
+controller. Three times are measured and compared with those that the profile `ur5e`
 assumes:
 
 * sensing: the age of the newest frame with the puck when a decision begins, from the

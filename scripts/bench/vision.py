@@ -47,8 +47,6 @@ class Shot(NamedTuple):
 
     time: float
     """s"""
-    paddle: Array
-    """(2,) m"""
     puck: Array
     """(2,) m"""
     velocity: Array
@@ -110,7 +108,7 @@ def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
         if k % every == 0:
             seen = Seen(world.puck, world.puck_velocity, paddle, moving)
             picture = camera.photograph(seen, k)
-            shots.append(Shot(now, paddle, world.puck, world.puck_velocity, picture))
+            shots.append(Shot(now, world.puck, world.puck_velocity, picture))
     return shots
 
 
@@ -128,7 +126,7 @@ def measure(
     place_off: list[float] = []
     velocity_off: list[float] = []
     first: list[Sighting] = []
-    for now, paddle, puck, velocity, picture in shots:
+    for now, puck, velocity, picture in shots:
         began = time.process_time()
         sighting = detector.find(Frame(picture, now, 0))
         spent += time.process_time() - began
@@ -144,7 +142,7 @@ def measure(
         if len(first) < 3:
             first.append(sighting)
             if len(first) == 3:
-                tracker.begin(first, paddle)
+                tracker.begin(first)
             continue
         times = now - 0.008 * np.arange(100, -1, -1)
         track = np.array([[t, *sweep.at(t)[0]] for t in times])

@@ -114,6 +114,15 @@ def test_what_changed_with_version_1_is_that_of_its_rows():
         assert float(row["trained now"]) == pytest.approx(expected, abs=6e-4)
 
 
+def test_the_cost_of_sensed_contacts_is_that_of_the_rows():
+    text = " ".join((ROOT / "docs/tasks.md").read_text().split())
+    known = [row for row in rows_of("tasks_before.csv") if not row["blind"]]
+    assert len(known) == 5
+    for row in known:
+        now = mean(seeds(row["task"], "ur5e", "success"))
+        assert f"{row['task']} {row['trained']} before, {now:.3f} now" in text
+
+
 def test_answer_times_are_those_that_were_measured():
     rows = {f"`{row['profile']}`": row for row in rows_of("answer_times.csv")}
     shown = table("docs/physics.md", "profile", "answer time")

@@ -209,7 +209,7 @@ class RealBackend(Backend):
         self._began = self._due = time.monotonic()
         begun = self.scene.still_state(1)
         if seen:
-            self._tracker.begin(seen, self.robot.track[-1, 1:])
+            self._tracker.begin(seen)
         self._fill(begun, self._began, self._began)
         begun.time[:] = 0.0
         return begun

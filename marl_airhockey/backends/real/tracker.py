@@ -39,23 +39,20 @@ class Tracker:
         self.noise = 0.0
         """Mean distance of the sightings from the filtered positions, m."""
         if scene.pucks:
-            # Compiles the filter before an episode begins.
-            nowhere = np.zeros(2)
-            self.begin([Sighting(nowhere, 0.0, 1.0, nowhere)], nowhere)
-            self._update(nowhere, 0.1, True, np.zeros((2, 3)), 0.1)
+            # Compiles filter and contacts before an episode begins.
+            first, later = (
+                Sighting(np.zeros(2), t, 1.0, np.zeros(2)) for t in (0, 0.1)
+            )
+            self.begin([first])
+            self._follow(scene.still_state(1), later, np.zeros((2, 3)), 0.1, 0.0)
         self.forget()
 
     def forget(self) -> None:
         """Forget the puck until the next episode begins."""
         self.last, self._touching, self.noise = None, False, 0.0
 
-    def begin(self, seen: list[Sighting], paddle: Array) -> None:
-        """Begin an episode.
-
-        Args:
-            seen: First sightings of the puck, oldest first.
-            paddle: (2,) position of the paddle now, table frame, m.
-        """
+    def begin(self, seen: list[Sighting]) -> None:
+        """Begin an episode with the first sightings of the puck, oldest first."""
         first, last = seen[0], seen[-1]
         velocity = (last.place - first.place) / max(last.taken - first.taken, 1e-3)
         self._estimator.reset(
@@ -63,7 +60,6 @@ class Tracker:
             last.place.reshape(1, 1, 2),
             velocity.reshape(1, 1, 2),
             np.full((1, 1), last.taken),
-            paddle.reshape(1, 1, 2),
         )
         self.last = Track(last.taken, last.place, velocity)
 
@@ -137,7 +133,7 @@ class Tracker:
     ) -> None:
         at = now - SPACING * np.arange(PAST, -1, -1)
         path = np.stack([np.interp(at, track[:, 0], track[:, k]) for k in (1, 2)], -1)
-        self._estimator.update_along(
+        self._estimator.update(
             WORLD,
             position.reshape(1, 1, 2),
             np.full(1, taken),
