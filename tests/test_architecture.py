@@ -36,7 +36,6 @@ LONG = {
     "backends/pymunk/space.py": "one space with the callbacks of its collisions",
     "backends/real/backend.py": "the life of one table's devices, from start to stop",
     "contracts/scenario.py": "a contract with the methods that all scenarios share",
-    "data/minari_files.py": "both directions of one file format",
     "toolkit/observables.py": "twelve observables of some 25 lines each",
     "world/world.py": "one class, which all environments are views of",
 }

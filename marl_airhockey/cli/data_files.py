@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from marl_airhockey.cli.data import show
-from marl_airhockey.cli.options import console
+from marl_airhockey.cli.options import Options, console, settings
 from marl_airhockey.core.errors import require
 
 
@@ -119,40 +119,60 @@ def export(
         list[Path], typer.Argument(help="Recordings, or folders of them.")
     ],
     name: Annotated[
-        str, typer.Option(help="Of the Minari dataset: airhockey/juggle/test-v0.")
+        str, typer.Option(help="Name of the dataset: airhockey/juggle/test-v0.")
     ],
-    seat: Annotated[int, typer.Option(help="Whose steps; -1 for all, by agent.")] = 0,
+    to: Annotated[
+        str, typer.Option(help="Format: minari, lerobot, hdf5 or rows.")
+    ] = "minari",
+    seat: Annotated[
+        int, typer.Option(help="Seat whose steps are written; -1 for all, by agent.")
+    ] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of all datasets; Minari's own.")
+        Path | None,
+        typer.Option(help="Folder of all datasets; Minari's own, else datasets."),
     ] = None,
 ) -> None:
-    """Write recordings as a Minari dataset, which others load without this library."""
-    from marl_airhockey.data.files import recordings_in
-    from marl_airhockey.data.minari_files import export_minari
+    """Write recordings as a dataset that others load without this library."""
+    from marl_airhockey.data.exchange.formats import find_format
+    from marl_airhockey.data.files import recordings_in, size_of
 
     files = recordings_in(paths)
-    folder = export_minari(files, name, out, None if seat < 0 else seat)
-    size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-    console.print(f"wrote {folder} ({size / 1e6:.1f} MB)", soft_wrap=True)
+    chosen = None if seat < 0 else seat
+    folder = find_format(to).export(files, name, out, chosen)
+    console.print(f"wrote {folder} ({size_of(folder) / 1e6:.1f} MB)", soft_wrap=True)
 
 
 def import_dataset(
-    name: Annotated[str, typer.Argument(help="Of a Minari dataset of one seat.")],
-    scenario: Annotated[str, typer.Option("--scenario", "-s", help="That it is of.")],
-    out: Annotated[Path, typer.Option(help="Folder of recordings.")] = Path(
-        "recordings"
-    ),
+    source: Annotated[
+        str,
+        typer.Argument(
+            help="Name of a Minari dataset; folder of a LeRobot dataset; or HDF5 "
+            "trajectories or CSV rows t,x,y, a file or a folder of them."
+        ),
+    ],
+    scenario: Annotated[
+        str, typer.Option("--scenario", "-s", help="Scenario that it is of.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the recording; recordings/SOURCE.")
+    ] = None,
+    option: Options = None,
     root: Annotated[
-        Path | None, typer.Option(help="Folder of all datasets; Minari's own.")
+        Path | None, typer.Option(help="Folder of all Minari datasets; Minari's own.")
     ] = None,
     control_dt: Annotated[
-        float, typer.Option(help="Time of a step, s, where it does not say.", min=1e-4)
+        float,
+        typer.Option(help="Time of a step, s, if the data do not give it.", min=1e-4),
     ] = 0.05,
 ) -> None:
-    """Write a Minari dataset as a recording, to learn from it."""
-    from marl_airhockey.data.minari_files import import_minari
+    """Write a dataset of others as a recording, to learn from it or to relabel it."""
+    from marl_airhockey.data.exchange.formats import import_dataset as imported
+    from marl_airhockey.data.exchange.settings import ImportSettings
 
-    show([import_minari(name, scenario, out, control_dt, root)], False)
+    folder = out or Path("recordings") / source.strip("/.").replace("/", "-")
+    options = settings(option) if option else {}
+    asked = ImportSettings(source, scenario, folder, options, control_dt, root)
+    show([imported(asked)], False)
 
 
 COMMANDS = (repair, merge, split, convert, relabel, extract, export)

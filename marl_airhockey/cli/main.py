@@ -19,6 +19,7 @@ from marl_airhockey.cli import (
     crossplay,
     data,
     data_files,
+    data_sets,
     evaluate,
     fit,
     lab,
@@ -85,6 +86,8 @@ calibrate.calibrate.command()(calibrate_arm.arm)
 for function in data_files.COMMANDS:
     data.data.command()(function)
 data.data.command("import")(data_files.import_dataset)
+data.data.command("get")(data_sets.get)
+data.data.command("list")(data_sets.list_datasets)
 for name, group in GROUPS.items():
     app.add_typer(group, name=name)
 

@@ -42,7 +42,8 @@ def watch(
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
     episodes: Annotated[int, typer.Option(help="How many.")] = 1,
     video: Annotated[
-        Path | None, typer.Option(help="Write a .gif or .mp4 instead of a window.")
+        Path | None,
+        typer.Option(help="Write a .gif, .webp or .mp4 instead of a window."),
     ] = None,
     option: Options = None,
     other: Drivers = None,

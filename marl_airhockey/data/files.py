@@ -3,15 +3,32 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.recording import META
 from marl_airhockey.data.reader import read_head
+from marl_airhockey.jit.cache import cache_folder
 
+PREFIX = "airhockey"
+"""First part of the names of the named datasets"""
 ALIKE = ("scenario", "options", "observe", "control_dt", "profile")
 """Keys of heads that recordings of one dataset must share"""
+
+
+def dataset_folder(name: str) -> Path:
+    """Return the folder of a named dataset, which may not have been built yet."""
+    return cache_folder() / "datasets" / name
+
+
+def shown_name(path: Path) -> str:
+    """Return a path as it is shown: of a named dataset, its name and part."""
+    root = dataset_folder("")
+    return str(path.relative_to(root) if path.is_relative_to(root) else path)
 
 
 def is_recording(path: Path) -> bool:
@@ -22,14 +39,20 @@ def is_recording(path: Path) -> bool:
 def recordings_in(paths: Sequence[Path]) -> list[Path]:
     """Return the recordings among some paths and in the folders among them.
 
+    Args:
+        paths: Recordings, folders, and names of datasets that have been built.
+
     Raises:
         ValueError: A path that is not there, or no recording at all.
     """
     found: list[Path] = []
     for path in paths:
-        if not path.exists():
-            raise ValueError(f"{path}: there is no such file or folder")
-        found += sorted(meta.parent for meta in path.rglob(META))
+        named = not path.exists() and path.parts[:1] == (PREFIX,)
+        where = dataset_folder(str(path)) if named else path
+        if not where.exists():
+            hint = f"; airhockey data get {path}" if named else ""
+            raise ValueError(f"{path}: there is no such file or folder{hint}")
+        found += sorted(meta.parent for meta in where.rglob(META))
     if not found:
         old = next((f for path in paths for f in path.rglob("*.rec")), None)
         hint = "; files *.rec: airhockey data convert" if old else ""
@@ -41,6 +64,25 @@ def new_recording(folder: Path, scenario: str) -> Path:
     """Return a path for a new recording in a folder, named by the time."""
     now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S-%f")
     return folder / f"{now}-{scenario}"
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Make a folder that is there when it is complete and, after any error, not.
+
+    Yields the path at which it is to be written.
+
+    Raises:
+        ValueError: There is such a folder.
+    """
+    if path.exists():
+        raise ValueError(f"{path}: there is such a folder; name another")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-") as part:
+        made = Path(part) / path.name
+        made.mkdir()
+        yield made
+        shutil.move(str(made), path)
 
 
 def size_of(recording: Path) -> int:

@@ -20,7 +20,8 @@ from marl_airhockey.data.columns import (
 )
 from marl_airhockey.data.derived import resume
 from marl_airhockey.data.files import is_recording
-from marl_airhockey.data.writer import RecordingWriter
+from marl_airhockey.data.film import film_columns
+from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.devices.camera import Film
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
@@ -68,12 +69,7 @@ def record_episodes(
     live = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
     at_once = 1 if live else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
-    others = keywords.get("drivers", {})
-    players = [
-        _player(name if i == 0 else others.get(f"paddle_{i}", name))
-        for i in range(len(world.scene.seats))
-    ]
-    head = {**head_of(world, keywords), "players": players, "first_seed": seed}
+    head = _head(world, name, seed, keywords)
     try:
         camera = _camera(world) if film else None
         with _opened(path, head) as writer:
@@ -86,7 +82,7 @@ def record_episodes(
                 for first in range(begun, episodes, at_once):
                     world.reset(seed + first)
                     done = min(at_once, episodes - first)
-                    _record(world, writer, done)
+                    _record(world, writer, done, film=reel)
                     progress(first + done)
             finally:
                 if reel is not None:
@@ -94,6 +90,54 @@ def record_episodes(
     finally:
         world.close()
     return path
+
+
+def record_steps(
+    driver: Driver,
+    name: str,
+    scenario: str,
+    steps: int,
+    path: Path,
+    seed: int,
+    keywords: Keywords,
+) -> Path:
+    """Record the fewest whole episodes that have a number of steps together.
+
+    Args:
+        driver: Driver that plays, in simulation.
+        name: Its name in the recording.
+        scenario: Name of the scenario.
+        steps: Least number of steps.
+        path: Folder of the recording, which must not exist.
+        seed: Seed of the first episode.
+        keywords: Keywords of the environment, drivers of other seats among them.
+
+    Returns:
+        ``path``.
+
+    Raises:
+        ValueError: A seat without a driver, or a folder that exists.
+    """
+    world = build_driven_world(driver, scenario, AT_ONCE, keywords)
+    left = steps
+    try:
+        with whole_recording(path, _head(world, name, seed, keywords)) as writer:
+            while left > 0:
+                world.reset(seed + writer.episodes)
+                left -= _record(world, writer, AT_ONCE, left)
+    finally:
+        world.close()
+    return path
+
+
+def _head(world: World, name: str, seed: int, keywords: Keywords) -> dict[str, Any]:
+    """Return the head of a recording."""
+    others = keywords.get("drivers", {})
+    players = [
+        _player(name if i == 0 else others.get(f"paddle_{i}", name))
+        for i in range(len(world.scene.seats))
+    ]
+    return {**head_of(world, keywords), "players": players, "first_seed": seed}
 
 
 def _opened(path: Path, head: dict[str, Any]) -> RecordingWriter:
@@ -135,9 +179,27 @@ def _player(driver: Any) -> dict[str, Any]:
     return {"driver": name, "person": None}
 
 
-def _record(world: World, writer: RecordingWriter, count: int) -> None:
-    """Play an episode in each world, and write the first ``count`` of them."""
-    first, notes = first_columns(world), [episode_notes(world, i) for i in range(count)]
+def _record(
+    world: World,
+    writer: RecordingWriter,
+    count: int,
+    most: int | None = None,
+    film: Film | None = None,
+) -> int:
+    """Play an episode in each world, and write the first ``count`` of them.
+
+    Args:
+        world: Worlds whose episodes have begun.
+        writer: Writer of the recording.
+        count: Number of episodes that are written at most.
+        most: Number of steps after which no further episode is written.
+        film: Film of the only world's camera.
+
+    Returns:
+        Number of steps that were written.
+    """
+    first = first_columns(world) | (film_columns(film) if film else {})
+    notes = [episode_notes(world, i) for i in range(count)]
     rows: list[Columns] = []
     length = np.zeros(world.num_worlds, np.int64)
     done, no_actions = length > 0, np.zeros((world.num_worlds, 0, 2))
@@ -146,10 +208,13 @@ def _record(world: World, writer: RecordingWriter, count: int) -> None:
         result = world.step(no_actions)
         length[~done] += 1
         done |= result.terminated | result.truncated
-        rows.append(step_columns(world))
+        rows.append(step_columns(world) | (film_columns(film) if film else {}))
         if result.interruption:
             reasons[0] = result.interruption
-    write_episodes(writer, first, rows, length, notes, reasons)
+    if most is not None:
+        count = min(count, 1 + int(np.searchsorted(np.cumsum(length), most)))
+    write_episodes(writer, first, rows, length, notes[:count], reasons[:count])
+    return int(length[:count].sum())
 
 
 def write_episodes(

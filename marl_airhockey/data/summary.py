@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.data.files import size_of
+from marl_airhockey.data.files import shown_name, size_of
 from marl_airhockey.data.reader import read_episode_rows, read_head, step_counts
 
 
@@ -35,7 +35,7 @@ class Summary:
         """Return the cells of a table."""
         cut = f" ({self.cut_off} cut off)" if self.cut_off else ""
         return [
-            self.path,
+            shown_name(Path(self.path)),
             f"{self.scenario}, {self.profile}",
             ", ".join(self.players),
             *(f"{self.episodes}{cut}", str(self.steps), f"{self.success:.3f}"),

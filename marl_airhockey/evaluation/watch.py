@@ -10,7 +10,7 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.render.renderer import TOP, Renderer
-from marl_airhockey.render.video import write_video
+from marl_airhockey.render.video import check_ending, write_video
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_driven_world
 
@@ -37,7 +37,7 @@ def show_episodes(
         keywords: keywords of the environment.
         seed: seed of the first episode.
         episodes: number of episodes.
-        video: .gif or .mp4 to write; None opens a window.
+        video: .gif, .webp or .mp4 to write; None opens a window.
         width: width of the video, pixels.
         seconds: time after which an episode is cut, s.
         viewpoint: "top", or one of the backend's viewpoints.
@@ -47,14 +47,14 @@ def show_episodes(
 
     Raises:
         RuntimeError: there is no screen for a window.
-        ValueError: a video that ends in neither .gif nor .mp4.
+        ValueError: A video with another ending.
     """
     if video is None and not any(
         os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
     ):
         raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
-    if video is not None and video.suffix not in (".gif", ".mp4"):
-        raise ValueError(f"video: {video.name!r} must end in .gif or .mp4")
+    if video is not None:
+        check_ending(video)
     world = build_driven_world(driver, scenario, 1, keywords)
     mode = "human" if video is None else "rgb_array"
     title = world.scenario.name.replace("_", " ")

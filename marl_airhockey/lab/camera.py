@@ -47,10 +47,14 @@ class LabCamera(ABC, Generic[What]):
 
     def __init__(self, view: View, exposure: float = 1 / 120, seed: int = 0) -> None:
         self.view, self._exposure = view, exposure
-        self._rng = np.random.default_rng(seed)
+        rng, (width, height) = np.random.default_rng(seed), view.lens.size
+        self._grain = [
+            rng.normal(0, NOISE, (height, width, 3)).astype(np.float32)
+            for _ in range(NOISES)
+        ]
+        self._noise = [grain.astype(np.int16) for grain in self._grain]
         self._empty: list[Array] = []
-        self._noise: list[Array] = []
-        self._light = np.ones(1)
+        self._light: Array = np.ones(1)
         self._shown: Array | None = None
         self.dark = False
         """True if the lights are off, a fault"""
@@ -88,22 +92,17 @@ class LabCamera(ABC, Generic[What]):
 
     def move(self, view: View) -> None:
         """Change the camera's view."""
-        self.view = view
         width, height = view.lens.size
-        shape = height, width
         across = np.mgrid[0:height, 0:width][1]
-        self._light = (1 - 0.25 * ((across - 200) / width) ** 2)[..., None]
+        light = (1 - 0.25 * ((across - 200) / width) ** 2)[..., None]
         flat = enlarged(view)
         drawn = np.full((*flat.lens.size[::-1], 3), FLOOR, np.uint8)
         self._draw_still(drawn, flat)
-        self._still = through_lens(view, drawn).round().astype(np.uint8)
-        scene = self._still * self._light
-        noises = [
-            self._rng.normal(0, NOISE, (*shape, 3)).astype(np.float32)
-            for _ in range(NOISES)
-        ]
-        self._noise = [n.astype(np.int16) for n in noises]
-        self._empty = [np.clip(scene + n, 0, 255).astype(np.uint8) for n in noises]
+        still = through_lens(view, drawn).round().astype(np.uint8)
+        scene = still * light
+        empty = [np.clip(scene + g, 0, 255).astype(np.uint8) for g in self._grain]
+        # Assigned last and at once, as frames are taken meanwhile by another thread.
+        self.view, self._light, self._still, self._empty = view, light, still, empty
 
     def show_board(self, number: int | None) -> None:
         """Show a ChArUco board to the camera, or remove it.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -55,6 +56,7 @@ class TableLoop:
         self._camera = TableCamera(setup.geometry, self._view, base, seed=seed)
         self._every = max(round(RATE / frame_rate), 1)
         self._steps, self._frames, self._frozen = 0, 0, False
+        self._moving: threading.Thread | None = None
         self._now = time.monotonic()
         self._paddle_state = block.read()[1:].tolist()
         self.faults: dict[str, Callable[[bool], None]] = {
@@ -80,8 +82,12 @@ class TableLoop:
 
     def _move_camera(self, on: bool) -> None:
         x, y, z = self._view.translation
-        moved = replace(self._view, translation=(x + MOVED, y, z))
-        self._camera.move(moved if on else self._view)
+        moved = replace(self._view, translation=(x + MOVED, y, z)) if on else self._view
+        # Beside the loop, as the new scenery takes longer than a frame.
+        if self._moving is not None:
+            self._moving.join()
+        self._moving = threading.Thread(target=self._camera.move, args=(moved,))
+        self._moving.start()
 
     def _remove_puck(self, on: bool) -> None:
         self.world.present = not on

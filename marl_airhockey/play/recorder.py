@@ -15,6 +15,7 @@ import numpy as np
 from marl_airhockey.core.recording import FILM, Columns
 from marl_airhockey.data.columns import episode_notes, head_of, step_columns
 from marl_airhockey.data.files import new_recording
+from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
@@ -77,7 +78,8 @@ class Recorder:
         trips = np.array([np.nan if d is None else d for d in delays])
         clock = np.array(time.time())
         row = {**_only(step_columns(match.world)), "round_trip": trips, "clock": clock}
-        row |= self._pictured()
+        if self._film is not None:
+            row |= _only(film_columns(self._film))
         self._writer.add(row)
 
     def end(self, match: LiveMatch, reason: str) -> None:
@@ -95,18 +97,6 @@ class Recorder:
     def trouble(self) -> str:
         """What is missing in the video that is being written; "" if nothing is."""
         return self._film.trouble if self._film is not None else ""
-
-    def _pictured(self) -> Columns:
-        """Return the number of the film's newest picture, and when it was taken, s.
-
-        Before the first the number is -1. Times are of the monotonic clock, as that of
-        the state is, ``device.moment``.
-        """
-        if self._film is None:
-            return {}
-        last = self._film.last
-        number, taken = last if last is not None else (-1, float("nan"))
-        return {"frame": np.array(number, np.int64), "frame_taken": np.array(taken)}
 
 
 def _only(columns: Columns) -> Columns:

@@ -23,13 +23,13 @@ def write_recording_video(
 
     Args:
         recording: its file.
-        video: the file to write, .gif or .mp4.
+        video: the file to write, .gif, .webp or .mp4.
         width: of the pictures, pixels.
         number: of the episode in the file.
 
     Raises:
-        ValueError: no recording, no such episode, or a video that ends in neither .gif
-            nor .mp4.
+        ValueError: no recording, no such episode, or a video with another
+            ending.
     """
     found, episode = one_episode(recording, number)
     scenario = scenario_of(found)

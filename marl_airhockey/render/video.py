@@ -1,8 +1,8 @@
-"""Video files: GIF by Pillow, MP4 by OpenCV."""
+"""Video files: GIF and WebP by Pillow, MP4 by OpenCV."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
@@ -11,44 +11,82 @@ from PIL import Image
 
 from marl_airhockey.types import Array
 
+QUALITY = 10
+"""Quality of WebP, 0 .. 100"""
+
 
 def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path:
-    """Write pictures (H, W, 3) uint8 RGB as a .gif or an .mp4; return its path.
+    """Write pictures (H, W, 3) uint8 RGB as a video; return its path.
 
     Args:
-        path: file to write; its folder is made.
-        pictures: of one size.
-        fps: pictures per second.
+        path: File to write, .gif, .webp or .mp4; its folder is made.
+        pictures: Pictures of one size.
+        fps: Pictures per second.
 
     Raises:
-        ValueError: no pictures, or another ending.
-        OSError: the file could not be written.
+        ValueError: No pictures, or another ending.
+        OSError: The file could not be written.
     """
     path = Path(path)
     if not pictures:
         raise ValueError("video: no pictures to write")
     path.parent.mkdir(parents=True, exist_ok=True)
-    if path.suffix == ".gif":
-        # One palette and no dithering: frames then differ only where things move.
-        some = [pictures[0], pictures[len(pictures) // 2], pictures[-1]]
-        palette = Image.fromarray(np.concatenate(some)).quantize(128)
-        frames = [
-            Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
-            for p in pictures
-        ]
-        rest, duration = frames[1:], round(1000 / fps)
-        frames[0].save(
-            path, append_images=rest, save_all=True, duration=duration, loop=0
-        )
-    elif path.suffix == ".mp4":
-        size = (pictures[0].shape[1], pictures[0].shape[0])
-        code = cv2.VideoWriter.fourcc(*"mp4v")
-        writer = cv2.VideoWriter(str(path), code, fps, size)
-        if not writer.isOpened():
-            raise OSError(f"video: {path} could not be written")
-        for picture in pictures:
-            writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-        writer.release()
-    else:
-        raise ValueError(f"video: {path.name!r} must end in .gif or .mp4")
+    check_ending(path)
+    WRITERS[path.suffix](path, pictures, fps)
     return path
+
+
+def check_ending(path: Path) -> None:
+    """Refuse the name of a file that is no video.
+
+    Raises:
+        ValueError: Another ending than those of `WRITERS`.
+    """
+    if path.suffix not in WRITERS:
+        endings = ", ".join(WRITERS)
+        raise ValueError(f"video: {path.name!r} must end in one of {endings}")
+
+
+def _write_gif(path: Path, pictures: Sequence[Array], fps: float) -> None:
+    # One palette and no dithering: frames then differ only where things move.
+    some = [pictures[0], pictures[len(pictures) // 2], pictures[-1]]
+    palette = Image.fromarray(np.concatenate(some)).quantize(128)
+    frames = [
+        Image.fromarray(p).quantize(palette=palette, dither=Image.Dither.NONE)
+        for p in pictures
+    ]
+    rest, duration = frames[1:], round(1000 / fps)
+    frames[0].save(path, append_images=rest, save_all=True, duration=duration, loop=0)
+
+
+def _write_webp(path: Path, pictures: Sequence[Array], fps: float) -> None:
+    # For pictures of a camera, whose noise makes a GIF forty times as large.
+    first, *rest = (Image.fromarray(picture) for picture in pictures)
+    duration = round(1000 / fps)
+    first.save(
+        path,
+        append_images=rest,
+        save_all=True,
+        duration=duration,
+        loop=0,
+        quality=QUALITY,
+    )
+
+
+def _write_mp4(path: Path, pictures: Sequence[Array], fps: float) -> None:
+    size = (pictures[0].shape[1], pictures[0].shape[0])
+    code = cv2.VideoWriter.fourcc(*"mp4v")
+    writer = cv2.VideoWriter(str(path), code, fps, size)
+    if not writer.isOpened():
+        raise OSError(f"video: {path} could not be written")
+    for picture in pictures:
+        writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    writer.release()
+
+
+WRITERS: dict[str, Callable[[Path, Sequence[Array], float], None]] = {
+    ".gif": _write_gif,
+    ".webp": _write_webp,
+    ".mp4": _write_mp4,
+}
+"""Writers of videos by the ending of the file"""

@@ -59,7 +59,7 @@ def test_a_policy_is_measured_where_it_was_trained_unless_told_otherwise():
 
 
 def test_watch_writes_a_film(tmp_path):
-    for name in ("a.gif", "a.mp4"):
+    for name in ("a.gif", "a.mp4", "a.webp"):
         airhockey("watch", "striker", "-s", "strike", "--video", tmp_path / name)
         assert (tmp_path / name).stat().st_size > 5000
 

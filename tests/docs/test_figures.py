@@ -2,6 +2,7 @@
 
 import csv
 import json
+import runpy
 from pathlib import Path
 from statistics import mean
 
@@ -22,6 +23,10 @@ COLUMNS = {
     "delayed": ("delayed", mean),
 }
 """Columns of the tables of tasks: a column of tasks.csv, and what is made of it."""
+
+
+def script(name):
+    return runpy.run_path(str(ROOT / "scripts" / name))
 
 
 def rows_of(name):
@@ -220,6 +225,24 @@ def test_faults_of_the_lab_are_those_of_their_rows():
         for title, column in zip(titles, columns, strict=True):
             value = row[column]
             assert line[title] == ("" if value is None else f"{1e3 * value:.0f}")
+
+
+def test_pairs_of_faults_are_those_of_their_rows():
+    rows = json.loads((DATA / "lab_faults.json").read_text())
+    assert sum("+" in row["faults"] for row in rows) == 105
+    shown = table("docs/lab.md", "reason of the end", "pairs")
+    assert shown == script("bench/lab_faults.py")["summary_of"](rows)
+
+
+def test_success_of_datasets_is_that_of_their_rows():
+    rows = {row["name"]: row for row in rows_of("datasets.csv")}
+    tiers = "medium-replay", "synthetic-human"
+    header, *lines = script("reproduce/datasets.py")["table_of"](rows)
+    shown = table("docs/datasets.md", *tiers)
+    assert shown == [dict(zip(header, line, strict=True)) for line in lines]
+    header, *lines = script("reproduce/datasets.py")["tiers_of"](rows)
+    shown = table("docs/datasets.md", "tier", "MB")
+    assert shown == [dict(zip(header, line, strict=True)) for line in lines]
 
 
 def test_latency_of_the_lab_is_that_of_its_rows():

@@ -5,6 +5,10 @@ import re
 import pytest
 from tutorials import run
 
+from marl_airhockey.data.exchange.formats import find_format
+from marl_airhockey.data.record import record_episodes
+from marl_airhockey.registry import make_agent
+
 
 @pytest.mark.slow
 def test_supersuit_shares_one_policy():
@@ -23,3 +27,35 @@ def test_torchrl_trains_with_the_state():
 def test_recurrent_and_hindsight_policies_of_sb3_contrib_learn():
     out = run("tutorials/with_sb3_contrib.py", "--steps", "4000")
     assert out.count(" an episode, standard deviation ") == 2
+
+
+def recorded(path, task):
+    agent = make_agent(f"zoo/{task}")
+    return record_episodes(agent, task, task, 60, path / task, 0, {})
+
+
+@pytest.mark.slow
+def test_torchrl_learns_from_a_minari_dataset_alone(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "sets"))
+    find_format("minari").export(
+        [recorded(tmp_path, "reach")], "airhockey/reach/test-v0", None, 0
+    )
+    words = "tutorials/with_minari.py", "airhockey/reach/test-v0"
+    errors = [
+        float(re.search(r"error of the action ([\d.]+)", run(*words, "--steps", n))[1])
+        for n in ("4", "400")
+    ]
+    assert errors[1] < 0.5 * errors[0]
+
+
+@pytest.mark.parametrize(
+    ("form", "script", "words"),
+    [
+        ("lerobot", "with_lerobot_files.py", "60 episodes, "),
+        ("hdf5", "with_h5py.py", "60 trajectories, "),
+    ],
+)
+def test_exported_files_are_read_without_us(tmp_path, form, script, words):
+    files = [recorded(tmp_path, "touch")]
+    folder = find_format(form).export(files, "set", tmp_path, 0)
+    assert words in run(f"tutorials/{script}", str(folder))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.data.benchmark.build import built
 from marl_airhockey.data.files import recordings_in, shared_head
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
@@ -70,7 +71,7 @@ def offline_config(
 
     Args:
         algo: name of the algorithm.
-        data: files and folders.
+        data: Files, folders and names of datasets, which are built if they are not.
         changes: settings by name.
 
     Raises:
@@ -79,7 +80,7 @@ def offline_config(
     if algo not in ALGORITHMS:
         raise ValueError(unknown_name("algo", algo, ALGORITHMS))
     check_names(OfflineConfig, changes)
-    files = recordings_in([Path(path) for path in data])
+    files = recordings_in([built(path) for path in data])
     head = shared_head(files)
     for name in ("scenario", "options", "observe", "control_dt"):
         if name in changes and changes[name] != head[name]:

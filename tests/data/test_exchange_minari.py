@@ -7,7 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from marl_airhockey.data.minari_files import export_minari, import_minari
+from marl_airhockey.data.benchmark.content import reference_returns
+from marl_airhockey.data.exchange.minari import export_minari, import_minari
+from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.registry import make_agent
@@ -72,7 +74,7 @@ def test_it_is_loaded_by_minari_alone(tmp_path, root):
 def test_it_comes_back_as_it_went(tmp_path):
     path = recorded(tmp_path / "first")
     export_minari([path], NAME)
-    again = import_minari(NAME, "reach", tmp_path / "second", 0.05)
+    again = import_minari(ImportSettings(NAME, "reach", tmp_path / "second"))
     before, after = read_recording(path), read_recording(again)
     for name in ("scenario", "options", "profile", "observe", "control_dt"):
         assert after.head[name] == before.head[name]
@@ -114,7 +116,25 @@ def test_what_cannot_be_is_named_and_leaves_nothing(tmp_path, root):
     with pytest.raises(ValueError, match="take a new version"):
         export_minari([path], NAME)
     with pytest.raises(ValueError, match="no such Minari dataset"):
-        import_minari("airhockey/none/none-v0", "reach", tmp_path, 0.05)
+        import_minari(
+            ImportSettings("airhockey/none/none-v0", "reach", tmp_path / "other")
+        )
     with pytest.raises(ValueError, match="observations have the shape"):
-        import_minari(NAME, "juggle", tmp_path, 0.05)
+        import_minari(ImportSettings(NAME, "juggle", tmp_path / "other"))
     assert not list(root.glob(".part*"))
+
+
+def test_normalized_scores_are_those_of_the_named_datasets(tmp_path):
+    export_minari([recorded(tmp_path)], NAME)
+    dataset = minari.load_dataset(NAME)
+    low, high = reference_returns("reach")
+    score = minari.get_normalized_score(dataset, np.array([low, high]))
+    assert np.allclose(score, [0.0, 1.0])
+    other = recorded(tmp_path / "other", profile="ur5e")
+    export_minari([other], "airhockey/reach/other-v0")
+    assert (
+        minari.load_dataset("airhockey/reach/other-v0").storage.metadata.get(
+            "ref_min_score"
+        )
+        is None
+    )

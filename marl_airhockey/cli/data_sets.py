@@ -1,0 +1,87 @@
+"""Commands ``airhockey data`` for the named datasets."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.box import SIMPLE
+from rich.table import Table
+
+from marl_airhockey.cli.options import AsJson, console
+from marl_airhockey.cli.progress import bar
+from marl_airhockey.core.errors import require
+
+
+def get(
+    name: Annotated[
+        str, typer.Argument(help="Name of the dataset: airhockey/juggle/expert-v0.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="New folder; the library's cache.")
+    ] = None,
+) -> None:
+    """Build a named dataset from its seeds, on this machine, and compare it."""
+    require("pyarrow", "data")
+    from marl_airhockey.data.benchmark.build import build_dataset
+    from marl_airhockey.data.benchmark.catalogue import find_dataset
+    from marl_airhockey.data.benchmark.content import content_of, published
+    from marl_airhockey.data.files import dataset_folder
+
+    dataset, folder = find_dataset(name), out or dataset_folder(name)
+    if out is not None or not folder.exists():
+        with bar() as shown:
+            task = shown.add_task(name, total=1.0, note="")
+            count = partial(shown.update, task)
+            build_dataset(dataset, folder, progress=lambda done: count(completed=done))
+    found, wanted = content_of(folder), published()[name]
+    console.print(
+        f"{folder}: {found.steps} steps, {found.episodes} episodes, "
+        f"{found.megabytes:.0f} MB, success {found.success:.3f}, "
+        f"return {found.returns:.2f}",
+        soft_wrap=True,
+    )
+    if found.checksum == wanted.checksum:
+        console.print("content: as published", soft_wrap=True)
+    else:
+        console.print(
+            f"content: checksum {found.checksum[:12]}, published "
+            f"{wanted.checksum[:12]} (success {wanted.success:.3f}, return "
+            f"{wanted.returns:.2f}): other versions or another processor round "
+            "otherwise",
+            soft_wrap=True,
+        )
+
+
+def list_datasets(as_json: AsJson = False) -> None:
+    """List the named datasets, and which of them have been built here."""
+    from marl_airhockey.data.benchmark.catalogue import datasets
+    from marl_airhockey.data.benchmark.content import published
+    from marl_airhockey.data.files import dataset_folder
+
+    contents = published()
+    here = {name: dataset_folder(name).exists() for name in datasets()}
+    if as_json:
+        rows = [
+            {"name": name, "built": here[name], **contents[name]._asdict()}
+            for name in here
+        ]
+        console.print_json(json.dumps(rows))
+        return
+    table = Table(box=SIMPLE, pad_edge=False)
+    table.add_column("dataset", no_wrap=True)
+    for title in ("success", "return", "MB", "built"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for name, built in here.items():
+        content = contents[name]
+        table.add_row(
+            name,
+            f"{content.success:.3f}",
+            f"{content.returns:.2f}",
+            f"{content.megabytes:.0f}",
+            "yes" if built else "",
+        )
+    console.print(table)

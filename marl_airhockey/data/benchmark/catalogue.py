@@ -1,0 +1,166 @@
+"""Catalogue of the named datasets: whose steps each of them holds.
+
+A name is ``airhockey/SCENARIO/TIER-vN``. Each part of a dataset is a recording of one
+player; together they have 100,000 steps or a few more, as episodes are whole.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.data.benchmark.synthetic import SyntheticHuman
+from marl_airhockey.data.files import PREFIX
+from marl_airhockey.policies.load import load_policy
+from marl_airhockey.registry import make_agent
+
+VERSION = 0
+"""Version of all datasets: it grows when players, tasks or physics change"""
+PROFILE = "ideal"
+"""Profile in which all are played"""
+STEPS = 100_000
+"""Least number of control steps of a dataset"""
+TASKS = (
+    *("reach", "reach_velocity", "touch", "strike", "strike_crowd", "juggle"),
+    *("puck_velocity", "move_block", "hit_goal", "hit_goal_velocity"),
+)
+"""Scenarios of the ten tasks"""
+SNAPSHOTS = ("early", "middle", "medium")
+"""Policies of a training run that was stopped at half of the expert's success"""
+POLICIES = Path(__file__).parent / "policies"
+"""Folder of these policies"""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Recording in a dataset: the steps of one player."""
+
+    player: str
+    """Name of the player in the recording, and of the folder"""
+    make: Callable[[], Driver]
+    """Maker of the player, which is at ``paddle_0``"""
+    share: float
+    """Share of the dataset's steps"""
+    others: Mapping[str, str] = field(default_factory=dict)
+    """Drivers of the other seats, by agent"""
+
+
+@dataclass(frozen=True)
+class NamedDataset:
+    """Named dataset."""
+
+    scenario: str
+    tier: str
+    parts: tuple[Part, ...]
+    what: str
+    """Description"""
+
+    @property
+    def name(self) -> str:
+        """Name with prefix and version."""
+        return f"{PREFIX}/{self.scenario}/{self.tier}-v{VERSION}"
+
+    def seed(self, part: Part) -> int:
+        """Return the seed of the first episode of a part."""
+        # Far from the seeds of tests and evaluations, and from each other.
+        return zlib.crc32(f"{self.name}/{part.player}".encode()) * 1000
+
+
+def snapshot(task: str, level: str) -> Path:
+    """Return the file of a policy that was not trained to the end."""
+    return POLICIES / f"{task}-{level}.npz"
+
+
+def _random(share: float) -> Part:
+    return Part("random", lambda: make_agent("random"), share)
+
+
+def _expert(task: str, share: float) -> Part:
+    return Part("expert", lambda: make_agent(f"zoo/{task}"), share)
+
+
+def _unfinished(task: str, level: str, share: float) -> Part:
+    # Actions are sampled, as those of a policy in training are.
+    path = snapshot(task, level)
+    return Part(level, lambda: load_policy(path, deterministic=False), share)
+
+
+def _synthetic(policy: str, share: float) -> Part:
+    return Part("synthetic-human", lambda: SyntheticHuman(make_agent(policy)), share)
+
+
+TIERS: dict[str, tuple[str, Callable[[str], tuple[Part, ...]]]] = {
+    "random": (
+        "actions are uniform in the action box",
+        lambda task: (_random(1.0),),
+    ),
+    "medium": (
+        "a PPO policy with about half of the expert's successes, actions sampled",
+        lambda task: (_unfinished(task, "medium", 1.0),),
+    ),
+    "medium-replay": (
+        "policies from the beginning of that training to its end, actions sampled",
+        lambda task: (
+            _random(0.25),
+            *(_unfinished(task, level, 0.25) for level in SNAPSHOTS),
+        ),
+    ),
+    "medium-expert": (
+        "half of the steps are of the medium policy, half of the expert",
+        lambda task: (_unfinished(task, "medium", 0.5), _expert(task, 0.5)),
+    ),
+    "expert": (
+        "the trained policy of the zoo, mean actions",
+        lambda task: (_expert(task, 1.0),),
+    ),
+    "synthetic-human": (
+        "the expert's intent, late, noisy and inconsistent: a script, and no person",
+        lambda task: (_synthetic(f"zoo/{task}", 1.0),),
+    ),
+}
+"""Descriptions and parts of the tiers of each task, by name"""
+
+
+def _play() -> tuple[Part, ...]:
+    """Return the parts of play in the duel: different pairs of players."""
+    players = {
+        "zoo-duel": (lambda: make_agent("zoo/duel", deterministic=False), "zoo/duel_1"),
+        "synthetic-human": (lambda: SyntheticHuman(make_agent("zoo/duel")), "allround"),
+        "allround": (lambda: make_agent("allround"), "zoo/duel_2"),
+        "striker": (lambda: make_agent("striker"), "goalkeeper"),
+        "random": (lambda: make_agent("random"), "striker"),
+    }
+    return tuple(
+        Part(name, make, 1 / len(players), {"paddle_1": other})
+        for name, (make, other) in players.items()
+    )
+
+
+def datasets() -> dict[str, NamedDataset]:
+    """Return all datasets by name."""
+    found = [
+        NamedDataset(task, tier, parts(task), what)
+        for task in TASKS
+        for tier, (what, parts) in TIERS.items()
+    ]
+    found.append(NamedDataset("duel", "play", _play(), "games of different players"))
+    return {dataset.name: dataset for dataset in found}
+
+
+def find_dataset(name: str) -> NamedDataset:
+    """Return a dataset by its name.
+
+    Raises:
+        ValueError: There is none of that name.
+    """
+    known = datasets()
+    if name not in known:
+        near = ", ".join(get_close_matches(name, known, 3, 0.0))
+        raise ValueError(
+            f"unknown dataset {name!r}; near it are {near}; airhockey data list has all"
+        )
+    return known[name]

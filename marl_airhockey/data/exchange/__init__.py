@@ -1,0 +1,1 @@
+"""Datasets of other libraries: recordings written as theirs, and theirs read."""

@@ -1,0 +1,83 @@
+"""Formats of other libraries, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.data.exchange.lerobot import export_lerobot, import_lerobot
+from marl_airhockey.data.exchange.lerobot_writer import INFO
+from marl_airhockey.data.exchange.minari import export_minari, import_minari
+from marl_airhockey.data.exchange.rows import export_rows, import_rows
+from marl_airhockey.data.exchange.settings import ImportSettings
+from marl_airhockey.data.exchange.trajectories import (
+    export_trajectories,
+    import_trajectories,
+)
+
+
+class Export(Protocol):
+    """Function that writes recordings as a dataset, and returns its path."""
+
+    def __call__(
+        self, files: Sequence[Path], name: str, root: Path | None, seat: int | None
+    ) -> Path: ...
+
+
+@dataclass(frozen=True)
+class Format:
+    """Format of another library."""
+
+    export: Export
+    read: Callable[[ImportSettings], Path]
+    """Import: writes a recording and returns its path"""
+    fits: Callable[[Path], bool]
+    """Whether a source looks like a dataset of the format"""
+
+
+def _any(path: Path, suffixes: tuple[str, ...]) -> bool:
+    """Return whether a path has one of some suffixes, or a file in it has."""
+    files = path.iterdir() if path.is_dir() else [path]
+    return any(file.suffix in suffixes for file in files)
+
+
+FORMATS = {
+    "lerobot": Format(
+        export_lerobot, import_lerobot, lambda path: (path / INFO).is_file()
+    ),
+    "hdf5": Format(
+        export_trajectories,
+        import_trajectories,
+        lambda path: path.exists() and _any(path, (".hdf5", ".h5")),
+    ),
+    "rows": Format(
+        export_rows, import_rows, lambda path: path.exists() and _any(path, (".csv",))
+    ),
+    # Last, as a Minari dataset is named and not a path.
+    "minari": Format(export_minari, import_minari, lambda path: True),
+}
+"""Formats by name, in the order in which an import looks for the one that fits"""
+
+
+def find_format(name: str) -> Format:
+    """Return a format.
+
+    Raises:
+        ValueError: There is none of that name.
+    """
+    if name not in FORMATS:
+        raise ValueError(unknown_name("format", name, FORMATS))
+    return FORMATS[name]
+
+
+def import_dataset(settings: ImportSettings) -> Path:
+    """Write a dataset of another library as a recording; return its path.
+
+    Raises:
+        ValueError: It cannot be read, or does not fit the scenario; named.
+    """
+    source = Path(settings.source)
+    return next(each for each in FORMATS.values() if each.fits(source)).read(settings)

@@ -1,0 +1,267 @@
+"""LeRobotDataset v3.0: recordings as its files, and its files as recordings.
+
+A frame holds what was there before a step, the action, and its result (`next.*`). The
+observation after the last step of an episode is a column of the table of episodes,
+`final/NAME`, which LeRobot ignores. The film of a real table becomes a video, of which
+each frame shows the newest picture at the beginning of its step.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.recording import FILM, PLAYED, Columns, RecordedEpisode
+from marl_airhockey.data.exchange.lerobot_writer import (
+    CODE,
+    DATA,
+    EPISODES,
+    FINAL,
+    INFO,
+    OURS,
+    LeRobotWriter,
+)
+from marl_airhockey.data.exchange.seats import (
+    agent_at,
+    check_seat,
+    check_shapes,
+    cut_off,
+    episodes_with_steps,
+    observations_of,
+    playable,
+)
+from marl_airhockey.data.exchange.settings import ImportSettings
+from marl_airhockey.data.files import shared_head, whole_folder
+from marl_airhockey.data.parquet import read_table
+from marl_airhockey.data.writer import whole_recording
+from marl_airhockey.make import parallel_env
+from marl_airhockey.types import Array
+
+STATE = ("position", "velocity", "angle", "spin")
+"""Fields of the true state that are the `observation.environment_state`"""
+OBSERVATION, ACTION = "observation.state", "action"
+NEEDED = (OBSERVATION, ACTION, "next.reward", "next.done")
+"""Features without which a dataset cannot be learned from"""
+
+
+def export_lerobot(
+    files: Sequence[Path], name: str, root: Path | None = None, seat: int | None = 0
+) -> Path:
+    """Write recordings as a LeRobot dataset; return its folder.
+
+    Args:
+        files: Recordings of one kind.
+        name: Name of the dataset.
+        root: Folder of all datasets; None for ``datasets``.
+        seat: Index of the seat whose steps are taken.
+
+    Raises:
+        ValueError: A dataset that exists, no seat, a rate that is not whole,
+            recordings that differ, or without steps.
+    """
+    require("pandas", "data")
+    if seat is None:
+        raise ValueError("--seat: a LeRobot dataset has the steps of one; name it")
+    head = shared_head(files)
+    rate = 1.0 / head["control_dt"]
+    if abs(rate - round(rate)) > 1e-6:
+        raise ValueError(
+            f"control_dt {head['control_dt']}: LeRobot takes whole frames per second"
+        )
+    final = (root or Path("datasets")) / name
+    with whole_folder(final) as folder:
+        writer = LeRobotWriter(folder, round(rate), _names(head, seat))
+        for path, episode in episodes_with_steps(files):
+            check_seat(episode, seat)
+            frames, last = _frames(episode, seat)
+            writer.add(frames, last, _task(head), *_film(path, episode))
+        ours = {**playable(head), "scenario": head["scenario"], "seat": seat}
+        writer.close({**ours, "backend": head["backend"]})
+    return final
+
+
+def _task(head: Mapping[str, Any]) -> str:
+    return f"air hockey: {head['scenario'].replace('_', ' ')}"
+
+
+def _names(head: Mapping[str, Any], seat: int) -> dict[str, list[str]]:
+    """Return the names of the numbers of features."""
+    names = {ACTION: ["x", "y"], "applied_action": ["x", "y"]}
+    if "goals" not in head:
+        env = parallel_env(head["scenario"], **playable(head))
+        labels = env.observation_labels(agent_at(env.possible_agents, seat))
+        names[OBSERVATION] = list(labels)
+        env.close()
+    return names
+
+
+def _frames(episode: RecordedEpisode, seat: int) -> tuple[Columns, Columns]:
+    """Return the features (T, ...) of an episode, and its last observation."""
+    columns, shown = episode.columns, {}
+    for part, values in observations_of(episode).items():
+        name = OBSERVATION if part in ("", "observation") else f"observation.{part}"
+        shown[name] = values[:, seat].astype(np.float32)
+    state = [
+        np.concatenate([episode.first[f"state.{n}"][None], columns[f"state.{n}"][:-1]])
+        for n in STATE
+        if f"state.{n}" in columns
+    ]
+    if state:
+        flat = [values.reshape(len(values), -1) for values in state]
+        known = {"observation.environment_state": np.concatenate(flat, 1)}
+    else:
+        known = {}
+    ended, truncated = cut_off(episode)
+    frames = {
+        **{name: values[:-1] for name, values in shown.items()},
+        **{name: values.astype(np.float32) for name, values in known.items()},
+        ACTION: columns["action"][:, seat].astype(np.float32),
+        "next.reward": columns["reward"][:, seat].astype(np.float32),
+        "next.success": columns["success"][:, seat].astype(bool),
+        "next.terminated": ended,
+        "next.truncated": truncated,
+        "next.done": ended | truncated,
+    }
+    if "applied_action" in columns:
+        frames["applied_action"] = columns["applied_action"][:, seat].astype(np.float32)
+    if "device.moment" in columns:
+        frames["measured_time"] = columns["device.moment"]
+    return frames, {name: values[-1] for name, values in shown.items()}
+
+
+def _film(path: Path, episode: RecordedEpisode) -> tuple[Path, Array] | tuple[()]:
+    """Return the film of an episode and its frame (T,) for each step, if it has one."""
+    if "frame" not in episode.columns or not (path / FILM).exists():
+        return ()
+    shown = np.concatenate([episode.first["frame"][None], episode.columns["frame"]])
+    return path / FILM, np.maximum(shown[:-1], 0)
+
+
+def import_lerobot(settings: ImportSettings) -> Path:
+    """Write a LeRobot dataset v3.0 of one seat as a recording; return its path.
+
+    Where there is no observation after an episode's last step, that before it is taken.
+
+    Raises:
+        ValueError: Another version, a feature that is missing, or one whose shape is
+            not that of the scenario.
+    """
+    folder = Path(settings.source)
+    info = _json(folder / INFO)
+    if info.get("codebase_version") != CODE:
+        raise ValueError(
+            f"{folder}: version {info.get('codebase_version')!r}, expected {CODE!r}"
+        )
+    features = info.get("features", {})
+    for name in NEEDED:
+        if name not in features:
+            raise ValueError(f"{folder}: the feature {name!r} is missing")
+    known = _json(folder / OURS) if (folder / OURS).exists() else {}
+    known.setdefault("control_dt", 1.0 / info["fps"])
+    head = settings.head("lerobot", known)
+    parts = _parts(features)
+    shapes = [tuple(features[name]["shape"]) for name in (OBSERVATION, ACTION)]
+    check_shapes(str(folder), head, None if len(parts) > 1 else shapes[0], shapes[1])
+    last = _last_observations(folder, parts)
+    with whole_recording(settings.out, head) as writer:
+        for number, frames in _episodes(folder):
+            first, columns = _columns(frames, parts, last.get(number, {}))
+            for name, values in columns.items():
+                if not np.isfinite(values).all():
+                    raise ValueError(
+                        f"{folder}: episode {number}: {name} is not finite"
+                    )
+            writer.begin(first, number)
+            writer.add_rows(columns)
+            writer.end(PLAYED)
+    return settings.out
+
+
+def _json(file: Path) -> dict[str, Any]:
+    """Return the contents of a JSON file.
+
+    Raises:
+        ValueError: It cannot be read; names the file.
+    """
+    try:
+        return dict(json.loads(file.read_text()))
+    except (OSError, ValueError, TypeError) as error:
+        raise ValueError(f"{file}: cannot be read: {error}") from error
+
+
+def _parts(features: Mapping[str, Any]) -> dict[str, str]:
+    """Return the columns of observations by the features that they are made of."""
+    goals = [f"observation.{name}" for name in ("achieved_goal", "desired_goal")]
+    if all(name in features for name in goals):
+        return {OBSERVATION: "observation.observation", **{n: n for n in goals}}
+    return {OBSERVATION: "observation"}
+
+
+def _last_observations(
+    folder: Path, parts: Mapping[str, str]
+) -> dict[int, dict[str, Array]]:
+    """Return the observations after the last steps, by episode and feature."""
+    found = {}
+    for file in sorted((folder / EPISODES).rglob("*.parquet")):
+        rows = read_table(file, ["episode_index", *(f"{FINAL}{n}" for n in parts)])
+        for row in rows.to_pylist():
+            number = int(row.pop("episode_index"))
+            found[number] = {
+                name.removeprefix(FINAL): np.array(value, np.float32)
+                for name, value in row.items()
+                if value is not None
+            }
+    return found
+
+
+def _episodes(folder: Path) -> Iterator[tuple[int, Columns]]:
+    """Yield the number and the features (T, ...) of each episode.
+
+    Raises:
+        ValueError: There are no data, or steps of an episode are missing.
+    """
+    files = sorted((folder / DATA).rglob("*.parquet"))
+    if not files:
+        raise ValueError(f"{folder / DATA}: there are no files *.parquet in it")
+    for file in files:
+        table = read_table(file)
+        numbers = table["episode_index"].to_numpy()
+        columns = {
+            name: np.array(table[name].to_pylist()) for name in table.column_names
+        }
+        for number in dict.fromkeys(numbers.tolist()):
+            rows = numbers == number
+            frames = {name: values[rows] for name, values in columns.items()}
+            if (frames["frame_index"] != np.arange(rows.sum())).any():
+                raise ValueError(f"{file}: episode {number}: frames are missing")
+            yield int(number), frames
+
+
+def _columns(
+    frames: Columns, parts: Mapping[str, str], last: Mapping[str, Array]
+) -> tuple[Columns, Columns]:
+    """Return the columns before the first step, and those (T, ...) after each."""
+    first, after = {}, {}
+    for name, column in parts.items():
+        shown = frames[name].astype(np.float32)
+        end = last.get(name, shown[-1])
+        shown = np.concatenate([shown, end[None]])[:, None]
+        first[column], after[column] = shown[0], shown[1:]
+    done = frames["next.done"].astype(bool)
+    cut = frames.get("next.truncated", np.zeros(len(done), bool)).astype(bool)
+    reward = frames["next.reward"].astype(np.float64)[:, None]
+    success = frames.get("next.success", np.zeros(len(done), bool)).astype(bool)
+    return first, {
+        **after,
+        "action": frames[ACTION].astype(np.float64)[:, None],
+        "reward": reward,
+        "returns": np.cumsum(reward, axis=0),
+        "success": success[:, None],
+        "terminated": frames.get("next.terminated", done & ~cut).astype(bool),
+        "truncated": cut,
+    }

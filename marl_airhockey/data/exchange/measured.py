@@ -1,0 +1,185 @@
+"""Recordings made of measured positions of a puck and a paddle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.physics import Physics
+from marl_airhockey.core.recording import Columns, Recording
+from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.core.state import RESULTS, Kind
+from marl_airhockey.data.columns import SENSED, STATE, scenario_of
+from marl_airhockey.data.exchange.settings import ImportSettings
+from marl_airhockey.data.writer import RecordingWriter
+from marl_airhockey.registry import make_scenario
+from marl_airhockey.types import Array
+
+BACKEND = "real"
+"""Backend of measured recordings: their states are known, and not simulated again"""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured episode of T + 1 rows, table frame."""
+
+    time: Array
+    """(T + 1,) times, s"""
+    puck: Array | None
+    """(T + 1, 2) positions, m; nan where the puck was not seen; None if it was not
+    measured at all: it is then at the far end of the table"""
+    paddle: Array
+    """(T + 1, 2) positions, m"""
+    paddle_velocity: Array | None = None
+    """(T + 1, 2) velocities, m/s; None to differentiate the positions"""
+    action: Array | None = None
+    """(T, 2) requested actions, fractions of top speed, ego frame; None to take those
+    that lead to the velocities"""
+
+
+def scenario_for(settings: ImportSettings) -> Scenario:
+    """Return the scenario of an import.
+
+    Raises:
+        ValueError: It has other bodies than one paddle and one puck.
+    """
+    scenario = make_scenario(settings.scenario, **settings.options)
+    bodies = scenario.scene.bodies
+    if bodies.kind != (Kind.PADDLE, Kind.PUCK):
+        raise ValueError(
+            f"{scenario.name}: measured are one paddle and one puck, and it has other "
+            "bodies; import as juggle or touch, say"
+        )
+    return scenario
+
+
+def recorded_scenario(path: Path, head: dict[str, Any]) -> Scenario:
+    """Return the scenario of a recording that has a puck.
+
+    Raises:
+        ValueError: It has none; named.
+    """
+    scenario = scenario_of(Recording(path, head, []))
+    if not scenario.scene.bodies.pucks:
+        raise ValueError(f"{path}: there is no puck in {scenario.name}")
+    return scenario
+
+
+def measured_head(settings: ImportSettings, control_dt: float) -> dict[str, object]:
+    """Return the head of a recording of measured episodes."""
+    scenario = scenario_for(settings)
+    known = {"control_dt": control_dt, "backend": BACKEND}
+    cycles = round(scenario.seconds / control_dt)
+    return {**settings.head("measured", known), "max_cycles": cycles, "physics": None}
+
+
+def write_measured(
+    writer: RecordingWriter,
+    scenario: Scenario,
+    found: Measured,
+    more: Columns,
+    reason: str,
+) -> None:
+    """Write a measured episode.
+
+    Positions of a puck that was not seen are interpolated, and marked as not visible.
+    Velocities are central differences of the positions.
+
+    Args:
+        writer: Writer of the recording.
+        scenario: Scenario with one paddle and one puck.
+        found: Episode.
+        more: Further columns (T + 1, ...).
+        reason: Reason of its end.
+
+    Raises:
+        ValueError: Fewer than two rows, times that do not grow, or a puck that is
+            never seen.
+    """
+    rows = len(found.time)
+    if rows < 2 or (np.diff(found.time) <= 0).any():
+        raise ValueError(f"{rows} rows: expected two or more, whose times grow")
+    puck, seen = _puck(scenario, found)
+    columns = _state_columns(scenario, found, puck, seen)
+    action = found.action
+    if action is None:
+        action = action_of(scenario, columns[STATE + "velocity"][1:, 0])
+    steps = np.arange(1, rows) == rows - 1
+    zeros = np.zeros((rows - 1, 1))
+    writer.begin(
+        {name: value[0] for name, value in {**columns, **more}.items()},
+        physics=_physics(scenario),
+    )
+    writer.add_rows(
+        {
+            **{name: value[1:] for name, value in {**columns, **more}.items()},
+            "action": action[:, None],
+            "reward": zeros,
+            "returns": zeros,
+            "success": zeros.astype(bool),
+            "terminated": np.zeros(rows - 1, bool),
+            "truncated": steps,
+        }
+    )
+    writer.end(reason)
+
+
+def action_of(scenario: Scenario, velocity: Array) -> Array:
+    """Return the actions (T, 2) that request velocities (T, 2), table frame, m/s."""
+    seat = scenario.scene.seats[0]
+    ego = velocity @ scenario.scene.table.rotation(seat.side).T
+    return np.asarray(np.clip(ego / seat.speed, -1.0, 1.0))
+
+
+def _puck(scenario: Scenario, found: Measured) -> tuple[Array, Array]:
+    """Return positions (T + 1, 2) of the puck, and where it was seen (T + 1,)."""
+    rows = len(found.time)
+    if found.puck is None:
+        far = scenario.scene.table.size[0] / 2 - scenario.scene.table.puck_radius
+        return np.tile([far, 0.0], (rows, 1)), np.zeros(rows, bool)
+    seen = np.asarray(np.isfinite(found.puck).all(1))
+    if not seen.any():
+        raise ValueError("the puck is never seen")
+    return interpolated(found.time, found.puck, seen), seen
+
+
+def interpolated(time: Array, position: Array, seen: Array) -> Array:
+    """Return positions (T, 2), linear in time where a body was not seen."""
+    known = time[seen], position[seen]
+    return np.stack([np.interp(time, known[0], known[1][:, k]) for k in range(2)], 1)
+
+
+def _state_columns(
+    scenario: Scenario, found: Measured, puck: Array, seen: Array
+) -> Columns:
+    """Return the columns (T + 1, ...) of states and of what was seen."""
+    rows, time = len(found.time), found.time - found.time[0]
+    still = scenario.scene.still_state(rows)
+    state = {name: np.array(getattr(still, name)) for name in RESULTS}
+    moving = found.paddle_velocity
+    if moving is None:
+        moving = np.gradient(found.paddle, time, axis=0)
+    state["position"][:] = np.stack([found.paddle, puck], 1)
+    state["velocity"][:] = np.stack([moving, np.gradient(puck, time, axis=0)], 1)
+    state["time"][:] = time
+    last = np.maximum.accumulate(np.where(seen, time, -np.inf))
+    age = np.where(np.isfinite(last), time - last, 0.0)
+    return {
+        **{STATE + name: value for name, value in state.items()},
+        f"{SENSED}position": state["position"],
+        f"{SENSED}velocity": state["velocity"],
+        f"{SENSED}visible": seen[:, None],
+        f"{SENSED}age": age[:, None],
+    }
+
+
+def _physics(scenario: Scenario) -> dict[str, float]:
+    """Return nominal physical parameters: those of the table are not known."""
+    physics = Physics(scenario.scene.defaults, arms=True, real=True)
+    streams = RandomStreams.keyed(np.zeros(1, np.uint64), np.zeros(1, int), "physics")
+    values = physics.draw(streams)
+    return {name: float(value[0]) for name, value in values.items()}

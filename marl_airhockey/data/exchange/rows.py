@@ -1,0 +1,150 @@
+"""Rows `t,x,y[,paddle_x,paddle_y]` of real tables: CSV files, one for each episode.
+
+Times are in s and positions in m, in the table frame; a cell is empty where puck or
+paddle was not seen. `airhockey fit-table` reads such files, too.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.core.recording import PLAYED, Columns, RecordedEpisode
+from marl_airhockey.data.columns import SENSED, STATE
+from marl_airhockey.data.exchange.measured import (
+    Measured,
+    interpolated,
+    measured_head,
+    recorded_scenario,
+    scenario_for,
+    write_measured,
+)
+from marl_airhockey.data.exchange.seats import check_seat, episodes_with_steps
+from marl_airhockey.data.exchange.settings import ImportSettings
+from marl_airhockey.data.files import shared_head, whole_folder
+from marl_airhockey.data.writer import whole_recording
+from marl_airhockey.types import Array
+
+PUCK, PADDLE = ("t", "x", "y"), ("paddle_x", "paddle_y")
+"""Names of the columns of a file; those of the paddle may be missing"""
+MOMENT = "device.moment"
+"""Column of the measured times, s"""
+SEEN = "paddle_visible"
+"""Column that is true where the paddle was seen"""
+
+
+def import_rows(settings: ImportSettings) -> Path:
+    """Write CSV files of positions as a recording, an episode a file; return its path.
+
+    Positions between those that were seen are interpolated. Without columns of a
+    paddle, it is at the centre of its reach.
+
+    Raises:
+        ValueError: No such files, a missing column, or a cell that is no number; named.
+    """
+    scenario, path = scenario_for(settings), Path(settings.source)
+    files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
+    if not files:
+        raise ValueError(f"{path}: there are no files *.csv in it")
+    tables = [(file, read_rows(file)) for file in files]
+    steps = np.concatenate([np.diff(rows[:, 0]) for _, rows in tables])
+    control_dt = float(np.median(steps)) if len(steps) else 0.0
+    if not control_dt > 0:
+        raise ValueError(f"{files[0]}: expected two rows or more, whose times grow")
+    seat = scenario.scene.seats[0]
+    centre = np.mean(seat.reach, 0) @ scenario.scene.table.rotation(seat.side)
+    with whole_recording(settings.out, measured_head(settings, control_dt)) as writer:
+        for file, rows in tables:
+            time, paddle = rows[:, 0], rows[:, 3:5]
+            seen = np.asarray(np.isfinite(paddle).all(1))
+            place = np.tile(centre, (len(time), 1))
+            if seen.any():
+                place = interpolated(time, paddle, seen)
+            found = Measured(time, rows[:, 1:3], place)
+            more: Columns = {MOMENT: time, SEEN: seen}
+            try:
+                write_measured(writer, scenario, found, more, PLAYED)
+            except ValueError as error:
+                raise ValueError(f"{file}: {error}") from error
+    return settings.out
+
+
+def read_rows(file: Path) -> Array:
+    """Return the rows (T, 5) of a file; nan in empty cells.
+
+    Raises:
+        ValueError: It cannot be read, a column is missing, or a cell is no number.
+    """
+    try:
+        with file.open(newline="") as opened:
+            reader = csv.DictReader(opened, skipinitialspace=True)
+            header = [name.strip() for name in reader.fieldnames or ()]
+            reader.fieldnames = header
+            missing = [name for name in PUCK if name not in header]
+            if missing:
+                raise ValueError(
+                    f"{file}: column {missing[0]!r} is missing; the first line must be "
+                    "t,x,y, optionally with paddle_x,paddle_y"
+                )
+            rows = [
+                [_number(file, reader.line_num, row.get(n)) for n in (*PUCK, *PADDLE)]
+                for row in reader
+            ]
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{file}: cannot be read: {error}") from error
+    found = np.array(rows).reshape(-1, 5)
+    if not np.isfinite(found[:, 0]).all():
+        raise ValueError(f"{file}: a time is missing")
+    return found
+
+
+def _number(file: Path, line: int, cell: str | None) -> float:
+    try:
+        return float(cell) if cell and cell.strip() else np.nan
+    except ValueError:
+        raise ValueError(f"{file}, line {line}: {cell!r} is no number") from None
+
+
+def export_rows(
+    files: Sequence[Path], name: str, root: Path | None = None, seat: int | None = 0
+) -> Path:
+    """Write positions of puck and paddle as CSV files; return their folder.
+
+    They are the true ones in simulation, and the measured ones of a real table.
+
+    Raises:
+        ValueError: A folder that exists, no seat, no puck, recordings that differ, or
+            without steps.
+    """
+    if seat is None:
+        raise ValueError("--seat: the rows have one paddle; name its seat")
+    recorded_scenario(files[0], shared_head(files))
+    final = (root or Path("datasets")) / name
+    with whole_folder(final) as folder:
+        for k, (_, episode) in enumerate(episodes_with_steps(files)):
+            check_seat(episode, seat)
+            _write(folder / f"episode-{k:05d}.csv", episode, seat)
+    return final
+
+
+def _write(file: Path, episode: RecordedEpisode, seat: int) -> None:
+    known = episode.columns
+    time = MOMENT if MOMENT in known else STATE + "time"
+    names = [time, STATE + "position"]
+    measured = SEEN in known
+    if measured:
+        names += [SEEN, f"{SENSED}visible"]
+    parts = [np.concatenate([episode.first[n][None], known[n]]) for n in names]
+    pucks = known["action"].shape[1]
+    paddle, puck = parts[1][:, seat].copy(), parts[1][:, pucks].copy()
+    if measured:
+        paddle[~parts[2]], puck[~parts[3][:, 0]] = np.nan, np.nan
+    header = PUCK if np.isnan(paddle).all() else (*PUCK, *PADDLE)
+    with file.open("w", newline="") as opened:
+        writer = csv.writer(opened, lineterminator="\n")
+        writer.writerow(header)
+        for row in np.column_stack([parts[0], puck, paddle])[:, : len(header)].tolist():
+            writer.writerow(["" if np.isnan(x) else repr(x) for x in row])

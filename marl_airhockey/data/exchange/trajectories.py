@@ -1,0 +1,247 @@
+"""Trajectories of the paper's authors: HDF5 files with a row for each control tick.
+
+A file `trajectory_data{i}.hdf5` has `train_vals` (T, 35): time, trajectory, step,
+emergency stop, safety, pose, speed, force, acceleration, target pose, puck. Older files
+have no puck (32), and no safety either (31). Poses are of the tool in the robot's base
+frame, whose x axis points from the table to the robot and past it. The puck is in the
+authors' table frame, whose x is that of the robot plus `OFFSET`; its third number is 1
+where it was not seen. Pictures, `train_img`, stay in the file.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.errors import require
+from marl_airhockey.core.recording import PLAYED, Columns, RecordedEpisode
+from marl_airhockey.data.exchange.measured import (
+    Measured,
+    measured_head,
+    recorded_scenario,
+    scenario_for,
+    write_measured,
+)
+from marl_airhockey.data.exchange.seats import check_seat, episodes_with_steps
+from marl_airhockey.data.exchange.settings import ImportSettings
+from marl_airhockey.data.files import shared_head, whole_folder
+from marl_airhockey.data.writer import whole_recording
+from marl_airhockey.types import Array
+
+FIELDS = {
+    "time": 1,
+    "trajectory": 1,
+    "step": 1,
+    "emergency_stop": 1,
+    "safe": 1,
+    "pose": 6,
+    "speed": 6,
+    "force": 6,
+    "acceleration": 3,
+    "target_pose": 6,
+    "puck": 3,
+}
+"""Number of columns of each field of `train_vals`"""
+LAYOUTS = {35: (), 32: ("puck",), 31: ("safe", "puck")}
+"""Fields that are missing, by the number of columns"""
+ROBOT = "robot."
+"""Beginning of the names of columns that hold the fields as they are in the file"""
+OFFSET = 1.2
+"""Position of the authors' table frame along the x axis of the robot's base, m"""
+HEIGHT, TOOL = 0.30, (0.0, np.pi, 0.0)
+"""Height of the tool on the table, m, and its rotation vector in exported files, rad"""
+FULL = np.array([0.26, 0.12])
+"""(2,) displacement of the target pose that the authors call an action of 1, m"""
+FILE = re.compile(r"trajectory_data(\d+)\.(hdf5|h5)$")
+VALUES = "train_vals"
+
+
+def import_trajectories(settings: ImportSettings) -> Path:
+    """Write the authors' trajectories as a recording; return its path.
+
+    `state.*` is in our table frame; the fields of the file are kept as `robot.*`.
+
+    Raises:
+        ValueError: No such files, or one with other columns; names it.
+    """
+    require("h5py", "offline")
+    scenario, files = scenario_for(settings), trajectory_files(settings.source)
+    tables = [(file, _read(file)) for file in files]
+    steps = np.concatenate([np.diff(fields["time"][:, 0]) for _, fields in tables])
+    control_dt = round(float(np.median(steps)), 3)
+    if not control_dt > 0:
+        raise ValueError(f"{settings.source}: times do not grow")
+    head = measured_head(settings, control_dt)
+    with whole_recording(settings.out, head) as writer:
+        for file, fields in tables:
+            puck = fields.get("puck")
+            found = Measured(
+                time=fields["time"][:, 0],
+                puck=_puck(file, puck) if puck is not None else None,
+                paddle=-(fields["pose"][:, :2] + (OFFSET, 0.0)),
+                paddle_velocity=-fields["speed"][:, :2],
+                action=_actions(fields) @ _ego(scenario, 0).T,
+            )
+            raw = {ROBOT + name: values for name, values in fields.items()}
+            stopped = fields["emergency_stop"].any()
+            reason = "robot: emergency stop" if stopped else PLAYED
+            try:
+                write_measured(writer, scenario, found, raw, reason)
+            except ValueError as error:
+                raise ValueError(f"{file}: {error}") from error
+    return settings.out
+
+
+def trajectory_files(source: str) -> list[Path]:
+    """Return the files of trajectories that a path names, in order of their numbers.
+
+    Raises:
+        ValueError: There are none.
+    """
+    path = Path(source)
+    files = [path] if path.is_file() else [*path.glob("trajectory_data*")]
+    named = [(FILE.search(file.name), file) for file in files]
+    numbered = sorted((int(found[1]), file) for found, file in named if found)
+    if path.is_file():
+        return [path]
+    if not numbered:
+        raise ValueError(f"{source}: there are no files trajectory_data*.hdf5 in it")
+    return [file for _, file in numbered]
+
+
+def _read(file: Path) -> Columns:
+    """Return the fields (T, n) of a file.
+
+    Raises:
+        ValueError: It cannot be read, or has other columns; names the file.
+    """
+    import h5py
+
+    try:
+        with h5py.File(file) as opened:
+            values = np.asarray(opened[VALUES], np.float64)
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise ValueError(f"{file}: cannot be read: no {VALUES} ({error})") from error
+    columns = values.shape[1] if values.ndim == 2 else 0
+    if columns not in LAYOUTS or len(values) < 2:
+        raise ValueError(
+            f"{file}: {VALUES} has the shape {values.shape}, expected two rows or more "
+            f"of {' or '.join(map(str, LAYOUTS))} columns"
+        )
+    if not np.isfinite(values).all():
+        row = int(np.flatnonzero(~np.isfinite(values).all(1))[0])
+        raise ValueError(f"{file}: row {row} is not finite")
+    names = [name for name in FIELDS if name not in LAYOUTS[columns]]
+    ends = np.cumsum([FIELDS[name] for name in names])[:-1]
+    return dict(zip(names, np.split(values, ends, axis=1), strict=True))
+
+
+def _puck(file: Path, values: Array) -> Array:
+    """Return the puck (T, 2), our table frame, m; nan where it was not seen.
+
+    Some files have the puck in the robot's frame, or a flag that is 1 where it *was*
+    seen. A puck that was not seen keeps its position, which tells the flags apart.
+    """
+    place, hidden = values[:, :2].copy(), values[:, 2] > 0.5
+    moved = np.append(True, (np.diff(place, axis=0) != 0).any(1))
+    if moved[1:].any() and hidden[1:][moved[1:]].mean() > 0.5:
+        hidden = ~hidden
+    shown = place[~hidden]
+    if not len(shown):
+        raise ValueError(f"{file}: the puck is not seen in it")
+    if np.median(shown[:, 0]) < -1.0:
+        place[:, 0] += OFFSET
+    place[hidden] = np.nan
+    return -place
+
+
+def _actions(fields: Columns) -> Array:
+    """Return the actions (T - 1, 2) as the authors scale them, our table frame."""
+    gap = fields["target_pose"][:-1, :2] - fields["pose"][:-1, :2]
+    return np.asarray(np.clip(-gap / FULL, -1.0, 1.0))
+
+
+def _ego(scenario: Scenario, seat: int) -> Array:
+    """Return the rotation (2, 2) from the table frame to a seat's ego frame."""
+    scene = scenario.scene
+    return np.asarray(scene.table.rotation(scene.seats[seat].side))
+
+
+def export_trajectories(
+    files: Sequence[Path], name: str, root: Path | None = None, seat: int | None = 0
+) -> Path:
+    """Write the episodes of recordings as the authors' trajectories; return the folder.
+
+    Fields that came from such files are written as they were. Others are made of the
+    true state: force and acceleration are 0 then.
+
+    Raises:
+        ValueError: A folder that exists, no seat, no puck, recordings that differ, or
+            without steps.
+    """
+    require("h5py", "offline")
+    import h5py
+
+    if seat is None:
+        raise ValueError("--seat: a trajectory is that of one paddle; name it")
+    head, final = shared_head(files), (root or Path("datasets")) / name
+    with whole_folder(final) as folder:
+        rotation = _ego(recorded_scenario(files[0], head), seat)
+        for k, (_, episode) in enumerate(episodes_with_steps(files)):
+            check_seat(episode, seat)
+            fields = _kept_fields(episode) or _fields(k, episode, seat, rotation)
+            values = np.concatenate([*fields.values()], axis=1)
+            with h5py.File(folder / f"trajectory_data{k}.hdf5", "w") as opened:
+                compressed: dict[str, Any] = {"compression": "gzip"}
+                opened.create_dataset(VALUES, data=values, **compressed)
+    return final
+
+
+def _kept_fields(episode: RecordedEpisode) -> Columns:
+    """Return the fields (T + 1, n) of the file that an episode comes from, if any."""
+    names = [name for name in FIELDS if ROBOT + name in episode.columns]
+    return {name: _all_rows(episode, ROBOT + name) for name in names}
+
+
+def _fields(
+    number: int, episode: RecordedEpisode, seat: int, rotation: Array
+) -> Columns:
+    """Return the fields (T + 1, n) made of the states of an episode."""
+    position = _all_rows(episode, "state.position")
+    velocity = _all_rows(episode, "state.velocity")
+    action = np.concatenate([episode.columns["action"][:, seat], np.zeros((1, 2))])
+    seats = episode.columns["action"].shape[1]
+    rows = len(position)
+    one, zero = np.ones((rows, 1)), np.zeros((rows, 1))
+    upright = np.tile([HEIGHT, *TOOL], (rows, 1))
+    flat = -position[:, seat] - (OFFSET, 0.0)
+    target = flat - FULL * (action @ rotation)
+    return {
+        "time": _all_rows(episode, "state.time")[:, None],
+        "trajectory": number * one,
+        "step": np.arange(rows)[:, None] * one,
+        "emergency_stop": zero,
+        "safe": one,
+        "pose": np.hstack([flat, upright]),
+        "speed": np.hstack([-velocity[:, seat], np.zeros((rows, 4))]),
+        "force": np.zeros((rows, 6)),
+        "acceleration": np.zeros((rows, 3)),
+        "target_pose": np.hstack([target, upright]),
+        "puck": np.hstack([-position[:, seats], zero]),
+    }
+
+
+def _all_rows(episode: RecordedEpisode, name: str) -> Array:
+    """Return a column (T + 1, ...) with its value before the first step.
+
+    Raises:
+        ValueError: It was not recorded.
+    """
+    if name not in episode.columns:
+        raise ValueError(f"episode {episode.index}: {name} was not recorded")
+    return np.concatenate([episode.first[name][None], episode.columns[name]])

@@ -1,0 +1,333 @@
+"""Recordings as datasets of others: LeRobot, the authors' HDF5, rows; and back."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from marl_airhockey.core.recording import FILM
+from marl_airhockey.data.exchange.formats import FORMATS, find_format, import_dataset
+from marl_airhockey.data.exchange.lerobot import export_lerobot
+from marl_airhockey.data.exchange.settings import ImportSettings
+from marl_airhockey.data.exchange.trajectories import (
+    FIELDS,
+    FULL,
+    OFFSET,
+    export_trajectories,
+)
+from marl_airhockey.data.reader import read_recording
+from marl_airhockey.data.record import record_episodes
+from marl_airhockey.data.relabel import relabelled
+from marl_airhockey.registry import make_agent
+
+pd = pytest.importorskip("pandas")
+pq = pytest.importorskip("pyarrow.parquet")
+h5py = pytest.importorskip("h5py")
+
+
+def recorded(folder, scenario="reach", driver="reacher", episodes=3, **keywords):
+    path = folder / "recording"
+    agent = make_agent(driver)
+    return record_episodes(agent, driver, scenario, episodes, path, 0, keywords)
+
+
+def settings_for(source, scenario, out, **more):
+    return ImportSettings(str(source), scenario, out, **more)
+
+
+def all_rows(episode, name):
+    return np.concatenate([episode.first[name][None], episode.columns[name]])
+
+
+@pytest.mark.parametrize("goals", [{}, {"goals": "dict"}])
+def test_lerobot_dataset_comes_back_as_it_was_written(tmp_path, goals):
+    path = recorded(tmp_path, **goals)
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    again = import_dataset(settings_for(folder, "reach", tmp_path / "again"))
+    before, after = read_recording(path), read_recording(again)
+    for name in ("scenario", "options", "profile", "observe", "control_dt"):
+        assert after.head[name] == before.head[name]
+    for one, two in zip(before.episodes, after.episodes, strict=True):
+        shown = [n for n in one.first if n.startswith("observation")]
+        assert shown == [n for n in two.first if n.startswith("observation")]
+        for name in shown:
+            assert np.array_equal(all_rows(one, name), all_rows(two, name))
+        for name in ("action", "reward"):
+            single = one.columns[name].astype(np.float32)
+            assert np.array_equal(two.columns[name], single), name
+        for name in ("success", "terminated", "truncated"):
+            assert np.array_equal(one.columns[name], two.columns[name]), name
+
+
+def test_lerobot_dataset_is_read_by_pyarrow_and_pandas_alone(tmp_path):
+    path = recorded(tmp_path)
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    info = json.loads((folder / "meta/info.json").read_text())
+    episodes = read_recording(path).episodes
+    lengths = [len(episode) for episode in episodes]
+    assert info["codebase_version"] == "v3.0"
+    assert info["fps"] == 20
+    assert info["total_frames"] == sum(lengths)
+    file = info["data_path"].format(chunk_index=0, file_index=0)
+    table = pq.ParquetFile(folder / file)
+    assert [table.metadata.row_group(k).num_rows for k in range(3)] == lengths
+    frames = table.read().to_pandas()
+    for name, feature in info["features"].items():
+        size = 1 if feature["shape"] == [1] else len(frames[name].iloc[0])
+        assert [size] == feature["shape"], name
+        assert feature["names"] is None or len(feature["names"]) == size
+    assert (frames["index"] == np.arange(len(frames))).all()
+    assert np.allclose(frames["timestamp"], frames["frame_index"] / 20)
+    rows = pq.read_table(folder / "meta/episodes").to_pandas()
+    assert rows["length"].tolist() == lengths
+    assert rows["dataset_to_index"].tolist() == np.cumsum(lengths).tolist()
+    assert pd.read_parquet(folder / "meta/tasks.parquet").iloc[0].name
+    stats = json.loads((folder / "meta/stats.json").read_text())
+    actions = np.stack(frames["action"])
+    assert np.allclose(stats["action"]["mean"], actions.mean(0))
+    assert np.allclose(stats["action"]["q10"], np.quantile(actions, 0.1, axis=0))
+
+
+def test_lerobot_video_shows_the_newest_picture_of_each_step(tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    path = recorded(tmp_path, episodes=2)
+    code = cv2.VideoWriter.fourcc(*"MJPG")
+    film = cv2.VideoWriter(str(path / FILM), code, 30, (64, 48))
+    for level in range(0, 250, 20):
+        film.write(np.full((48, 64, 3), level, np.uint8))
+    film.release()
+    _add_frames(path, [0, 1, 1, 3, 4])
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    info = json.loads((folder / "meta/info.json").read_text())
+    name = "observation.images.table"
+    assert info["features"][name]["shape"] == [48, 64, 3]
+    file = info["video_path"].format(video_key=name, chunk_index=0, file_index=1)
+    video, levels = cv2.VideoCapture(str(folder / file)), []
+    while (read := video.read())[0]:
+        levels.append(int(read[1].mean().round()))
+    length = len(read_recording(path).episodes[1])
+    wanted = [20 * k for k in [0, 1, 1, 3, *[4] * (length - 4)]]
+    assert np.abs(np.array(levels) - wanted).max() < 10, "the nearest level"
+    stats = json.loads((folder / "meta/stats.json").read_text())[name]
+    assert np.array(stats["mean"]).shape == (3, 1, 1)
+
+
+def _add_frames(path, numbers):
+    """Give the steps of each episode the numbers of pictures, the last one on."""
+    meta = json.loads((path / "meta.json").read_text())
+    meta["columns"]["frame"] = {"dtype": "int64", "shape": []}
+    (path / "meta.json").write_text(json.dumps(meta))
+    for part in (path / "steps").iterdir():
+        frame = pq.read_table(part).to_pandas()
+        step = frame["step"].to_numpy()
+        frame["frame"] = np.array(numbers)[np.minimum(step, len(numbers) - 1)]
+        table = pq.read_table(part).append_column(
+            "frame", [frame["frame"].astype("int64").tolist()]
+        )
+        pq.write_table(table, part)
+
+
+def made_file(path, columns=35, robot_frame=False, inverted=False, rows=40):
+    """Write a file as the paper's authors describe theirs; return its rows."""
+    rng = np.random.default_rng(columns)
+    time = 1.7e9 + 0.05 * np.arange(rows)
+    pose = np.full((rows, 6), (-0.5, 0.0, 0.3, 0.0, -3.06, 0.0))
+    pose[:, :2] += 0.1 * np.sin(time[:, None] - time[0] + (0.0, 1.0))
+    target = pose.copy()
+    target[:, :2] += rng.uniform(-0.1, 0.1, (rows, 2))
+    puck = np.column_stack([np.linspace(-0.7, 0.3, rows), np.zeros(rows)])
+    hidden = np.arange(rows) % 7 == 3
+    for k in np.flatnonzero(hidden):
+        puck[k] = puck[k - 1]
+    parts = {
+        "time": time[:, None],
+        "trajectory": np.full((rows, 1), 4.0),
+        "step": np.arange(rows)[:, None],
+        "emergency_stop": np.zeros((rows, 1)),
+        "safe": np.ones((rows, 1)),
+        "pose": pose,
+        "speed": rng.normal(size=(rows, 6)),
+        "force": rng.normal(size=(rows, 6)),
+        "acceleration": rng.normal(size=(rows, 3)),
+        "target_pose": target,
+        "puck": np.column_stack([puck - (OFFSET * robot_frame, 0), hidden ^ inverted]),
+    }
+    missing = {35: (), 32: ("puck",), 31: ("safe", "puck")}[columns]
+    values = np.concatenate([parts[n] for n in FIELDS if n not in missing], 1)
+    with h5py.File(path, "w") as file:
+        file["train_vals"] = values
+        file["train_img"] = np.zeros((rows, 24, 32, 3), np.uint8)
+    return values, parts, puck, hidden
+
+
+@pytest.mark.parametrize("columns", [35, 32, 31])
+def test_authors_trajectories_come_back_as_they_were(tmp_path, columns):
+    source = tmp_path / "trajectory_data7.hdf5"
+    values, parts, *_ = made_file(source, columns)
+    path = import_dataset(
+        settings_for(source, "juggle", tmp_path / "new", options={"table": "full_size"})
+    )
+    (episode,) = read_recording(path).episodes
+    assert episode.columns["robot.force"].shape == (39, 6)
+    paddle = all_rows(episode, "state.position")[:, 0]
+    assert np.allclose(paddle, -parts["pose"][:, :2] - (OFFSET, 0.0))
+    gap = parts["target_pose"][:-1, :2] - parts["pose"][:-1, :2]
+    assert np.allclose(episode.columns["action"][:, 0], np.clip(-gap / FULL, -1, 1))
+    folder = export_trajectories([path], "again", tmp_path)
+    with h5py.File(folder / "trajectory_data0.hdf5") as file:
+        assert np.array_equal(file["train_vals"], values)
+
+
+@pytest.mark.parametrize("robot_frame", [False, True])
+@pytest.mark.parametrize("inverted", [False, True])
+def test_puck_of_authors_files_is_found_in_either_frame(
+    tmp_path, robot_frame, inverted
+):
+    source = tmp_path / "trajectory_data7.hdf5"
+    *_, puck, hidden = made_file(source, 35, robot_frame, inverted)
+    path = import_dataset(settings_for(source, "touch", tmp_path / "new"))
+    (episode,) = read_recording(path).episodes
+    seen = all_rows(episode, "sensed.visible")[:, 0]
+    assert np.array_equal(seen, ~hidden)
+    found = all_rows(episode, "state.position")[:, 1]
+    assert np.allclose(found[seen], -puck[seen])
+    assert np.diff(found[:, 0]).max() < 0.0, "gaps are interpolated"
+
+
+def test_simulated_recording_is_exported_as_the_authors_label_it(tmp_path):
+    path = recorded(tmp_path, "touch", "still", 1)
+    folder = export_trajectories([path], "sets", tmp_path)
+    (episode,) = read_recording(path).episodes
+    with h5py.File(folder / "trajectory_data0.hdf5") as file:
+        values = np.array(file["train_vals"])
+    assert values.shape == (len(episode) + 1, 35)
+    again = import_dataset(settings_for(folder, "touch", tmp_path / "again"))
+    (back,) = read_recording(again).episodes
+    for name in ("state.position", "action"):
+        assert np.allclose(back.columns[name], episode.columns[name], atol=1e-12)
+
+
+def test_imported_trajectories_are_relabelled_for_tasks(tmp_path):
+    source = tmp_path / "trajectory_data7.hdf5"
+    made_file(source, 35)
+    path = import_dataset(
+        settings_for(source, "juggle", tmp_path / "new", options={"table": "full_size"})
+    )
+    new = read_recording(relabelled(path, "touch", tmp_path / "touch"))
+    (episode,) = new.episodes
+    assert episode.columns["observation"].shape[0] == len(episode)
+    assert np.isfinite(episode.columns["observation"]).all()
+
+
+def test_rows_of_a_table_come_back_as_they_were(tmp_path):
+    rng = np.random.default_rng(0)
+    time = np.cumsum(rng.uniform(0.008, 0.009, 60))
+    puck, paddle = rng.uniform(-0.3, 0.3, (2, 60, 2))
+    rows = np.column_stack([time, puck, paddle]).tolist()
+    for k in (5, 6, 30, 59):
+        rows[k][1:3] = "", ""
+    source = tmp_path / "rows.csv"
+    with source.open("w", newline="") as file:
+        csv.writer(file).writerows([["t", "x", "y", "paddle_x", "paddle_y"], *rows])
+    path = import_dataset(settings_for(source, "touch", tmp_path / "new"))
+    (episode,) = read_recording(path).episodes
+    assert np.flatnonzero(~all_rows(episode, "sensed.visible")[:, 0]).tolist() == [
+        *(5, 6, 30, 59)
+    ]
+    folder = find_format("rows").export([path], "again", tmp_path, 0)
+    with (folder / "episode-00000.csv").open() as file:
+        header, *written = csv.reader(file)
+    assert header == ["t", "x", "y", "paddle_x", "paddle_y"]
+    assert written == [[str(cell) for cell in row] for row in rows]
+
+
+def test_rows_without_a_paddle_come_back_without_one(tmp_path):
+    source = tmp_path / "rows.csv"
+    source.write_text("t,x,y\n0.0,0.1,0.2\n0.01,0.11,0.2\n0.02,0.12,0.2\n")
+    path = import_dataset(settings_for(source, "touch", tmp_path / "new"))
+    folder = find_format("rows").export([path], "again", tmp_path, 0)
+    assert (folder / "episode-00000.csv").read_text() == source.read_text()
+
+
+BAD_ROWS = {
+    "column 'y' is missing": "t,x\n0,1\n",
+    "'abc' is no number": "t,x,y\n0,1,abc\n",
+    "times grow": "t,x,y\n0,0,0\n",
+    "never seen": "t,x,y\n0,,\n1,,\n",
+    "a time is missing": "t,x,y\n,0,0\n1,0,0\n",
+}
+
+
+@pytest.mark.parametrize("words", BAD_ROWS)
+def test_bad_rows_are_named_and_leave_nothing(tmp_path, words):
+    source = tmp_path / "rows.csv"
+    source.write_text(BAD_ROWS[words])
+    with pytest.raises(ValueError, match=words) as error:
+        import_dataset(settings_for(source, "touch", tmp_path / "new"))
+    assert "rows.csv" in str(error.value)
+    assert not (tmp_path / "new").exists()
+
+
+def test_bad_trajectories_are_named_and_leave_nothing(tmp_path):
+    source = tmp_path / "trajectory_data0.hdf5"
+    out = tmp_path / "new"
+    for values, words in (
+        (np.zeros((5, 20)), "expected two rows or more of 35 or 32 or 31 columns"),
+        (np.zeros((1, 35)), "expected two rows"),
+        (np.full((5, 35), np.nan), "row 0 is not finite"),
+        (np.zeros((5, 35)), "times do not grow"),
+    ):
+        with h5py.File(source, "w") as file:
+            file["train_vals"] = values
+        with pytest.raises(ValueError, match=words):
+            import_dataset(settings_for(source, "touch", out))
+    with h5py.File(source, "w") as file:
+        file["other"] = np.zeros(3)
+    with pytest.raises(ValueError, match="no train_vals"):
+        import_dataset(settings_for(source, "touch", out))
+    source.write_text("no hdf5")
+    with pytest.raises(ValueError, match="cannot be read"):
+        import_dataset(settings_for(source, "touch", out))
+    made_file(source)
+    with pytest.raises(ValueError, match="one paddle and one puck"):
+        import_dataset(settings_for(source, "duel", out))
+    assert not out.exists()
+
+
+def test_bad_lerobot_datasets_are_named_and_leave_nothing(tmp_path):
+    path, out = recorded(tmp_path), tmp_path / "new"
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    with pytest.raises(ValueError, match="there is such a folder"):
+        export_lerobot([path], "reach", tmp_path / "sets")
+    with pytest.raises(ValueError, match="--seat 4"):
+        export_lerobot([path], "other", tmp_path / "sets", 4)
+    assert not list((tmp_path / "sets").glob(".part*"))
+    with pytest.raises(ValueError, match="observations have the shape"):
+        import_dataset(settings_for(folder, "juggle", out))
+    info = folder / "meta/info.json"
+    content = json.loads(info.read_text())
+    info.write_text(json.dumps({**content, "codebase_version": "v2.1"}))
+    with pytest.raises(ValueError, match=r"version 'v2.1', expected 'v3.0'"):
+        import_dataset(settings_for(folder, "reach", out))
+    del content["features"]["next.reward"]
+    info.write_text(json.dumps(content))
+    with pytest.raises(ValueError, match=r"'next.reward' is missing"):
+        import_dataset(settings_for(folder, "reach", out))
+    info.write_text("no json")
+    with pytest.raises(ValueError, match="cannot be read"):
+        import_dataset(settings_for(folder, "reach", out))
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("form", ["hdf5", "rows"])
+def test_recording_without_a_puck_is_refused(tmp_path, form):
+    with pytest.raises(ValueError, match="there is no puck in reach"):
+        find_format(form).export([recorded(tmp_path)], "set", tmp_path, 0)
+    assert not (tmp_path / "set").exists()
+
+
+def test_unknown_format_is_refused():
+    with pytest.raises(ValueError, match="format 'csv'"):
+        find_format("csv")
+    assert [*FORMATS] == ["lerobot", "hdf5", "rows", "minari"]
