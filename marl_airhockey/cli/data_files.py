@@ -60,12 +60,25 @@ def relabel(
         list[str] | None,
         typer.Option(help="Scenario, repeatable; all that fit if none is given."),
     ] = None,
+    hindsight: Annotated[
+        int,
+        typer.Option(
+            help="Copies of each episode with goals that it reached; 0 for the goals "
+            "of the task.",
+            min=0,
+        ),
+    ] = 0,
 ) -> None:
     """Write a recording as data of other tasks with the same bodies, by name."""
+    from marl_airhockey.data.hindsight import with_hindsight
     from marl_airhockey.data.relabel import fitting, relabelled
 
     names = task or fitting(recording)
-    show([relabelled(recording, name, out / name) for name in names], False)
+    if hindsight:
+        paths = [with_hindsight(recording, n, out / n, hindsight) for n in names]
+    else:
+        paths = [relabelled(recording, name, out / name) for name in names]
+    show(paths, False)
 
 
 def convert(

@@ -51,19 +51,36 @@ def relabelled(
         ValueError: The scenario has other bodies, or needs what was not recorded.
     """
     head = read_head(path)
-    chosen = {**_table_of(head), **(options or {})}
+    new = new_head(head, scenario, options or {})
+    game = make_scenario(scenario, **new["options"])
+    with whole_recording(out, new) as writer:
+        for batch in batches(episodes_of(path)):
+            _write(Recording(path, head, batch), game, writer)
+    return out
+
+
+def new_head(
+    head: dict[str, Any], scenario: str, options: dict[str, Any]
+) -> dict[str, Any]:
+    """Return the head of a recording that is relabelled for a scenario.
+
+    Args:
+        head: Contents of its `meta.json`.
+        scenario: Name of the new scenario.
+        options: Fields of it, in addition to table and seats.
+
+    Raises:
+        ValueError: An unknown scenario or option.
+    """
+    chosen = {**_table_of(head), **options}
     game = make_scenario(scenario, **chosen)
-    new = {
+    return {
         **{k: v for k, v in head.items() if k not in LEFT_OUT},
         "scenario": game.name,
         "options": chosen,
         "max_cycles": round(game.seconds / float(head["control_dt"])),
         "relabelled_from": head["scenario"],
     }
-    with whole_recording(out, new) as writer:
-        for batch in _batches(episodes_of(path)):
-            _write(Recording(path, head, batch), game, writer)
-    return out
 
 
 def _table_of(head: dict[str, Any]) -> dict[str, Any]:
@@ -88,7 +105,7 @@ def fitting(path: Path) -> list[str]:
     return names
 
 
-def _batches(episodes: Iterator[RecordedEpisode]) -> Iterator[list[RecordedEpisode]]:
+def batches(episodes: Iterator[RecordedEpisode]) -> Iterator[list[RecordedEpisode]]:
     """Yield some episodes at a time; those without steps are left out."""
     whole = (episode for episode in episodes if len(episode))
     while batch := list(itertools.islice(whole, AT_ONCE)):

@@ -33,6 +33,14 @@ def linear_layers(widths: Sequence[int], gain: float) -> nn.Sequential:
     return nn.Sequential(*parts[:-1])
 
 
+@torch.no_grad()
+def move_toward(target: nn.Module, source: nn.Module, share: float) -> None:
+    """Move the parameters of a target network toward those of its source."""
+    pairs = zip(target.parameters(), source.parameters(), strict=True)
+    for ours, theirs in pairs:
+        ours.lerp_(theirs, share)
+
+
 class GaussianActor(nn.Module):
     """Actor whose actions are normal about a mean, after a fixed scaling of the input.
 
@@ -89,10 +97,13 @@ class TwinLayers(nn.Module):
 
     Args:
         widths: Widths of the input and the hidden layers, and 1.
+        normalized: Whether the output of each hidden layer is normalized over its
+            units, without learned factors (Ba, Kiros and Hinton, 2016).
     """
 
-    def __init__(self, widths: Sequence[int]) -> None:
+    def __init__(self, widths: Sequence[int], normalized: bool = False) -> None:
         super().__init__()
+        self._normalized = normalized
         pair = [linear_layers(widths, 1.0) for _ in range(2)]
         stacked = [
             [layer for layer in one if isinstance(layer, nn.Linear)] for one in pair
@@ -113,4 +124,6 @@ class TwinLayers(nn.Module):
             x = torch.baddbmm(bias, x, weight)
             if k < last:
                 x = torch.relu(x)
+                if self._normalized:
+                    x = nn.functional.layer_norm(x, x.shape[-1:])
         return x[..., 0]

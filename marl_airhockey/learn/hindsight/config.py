@@ -14,6 +14,8 @@ from marl_airhockey.registry import find_scenario, scenario_names
 
 ALGO = "sac_her"
 """Name of the algorithm"""
+CHOICES = {"ends": ("relabelled", "recorded"), "critics": ("mean", "quantiles")}
+"""Values of settings, by name"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +38,12 @@ class HindsightConfig(RunConfig):
     """Share by which the target critics follow in a gradient step"""
     relabelled: int = 4
     """Steps with a goal that was met later, for each with its own"""
+    critics: str = "mean"
+    """What the critics learn: the "mean" of the return, as SAC; or its "quantiles", as
+    TQC of sb3-contrib"""
+    ends: str = "relabelled"
+    """Terminations of steps with a goal that was met later: "relabelled", where the new
+    goal is met; or "recorded", those of the former goal, as stable-baselines3 has it"""
     memory_steps: int = 500_000
     """Steps that are kept to learn from"""
     learning_starts: int = 8_000
@@ -48,6 +56,10 @@ class HindsightConfig(RunConfig):
         super().__post_init__()
         if self.algo != ALGO:
             raise ValueError(unknown_name("algo", self.algo, [ALGO]))
+        for name, choices in CHOICES.items():
+            value = getattr(self, name)
+            if value not in choices:
+                raise ValueError(unknown_name(name, value, choices))
         if not has_goals(self.scenario):
             known = ", ".join(name for name in scenario_names() if has_goals(name))
             raise ValueError(

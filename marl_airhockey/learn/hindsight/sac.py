@@ -1,6 +1,7 @@
 """Soft actor-critic of stable-baselines3 with hindsight goals, over B worlds.
 
-Haarnoja et al. (2018); Andrychowicz et al. (2017). A step of an episode is learned from
+Haarnoja et al. (2018); Andrychowicz et al. (2017); with quantile critics, TQC of
+sb3-contrib, Kuznetsov et al. (2020). A step of an episode is learned from
 with the goal that it had and with goals that the episode came to later; the rewards of
 those are computed anew.
 """
@@ -13,7 +14,9 @@ import torch
 from stable_baselines3 import SAC, HerReplayBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.engine import (
@@ -22,6 +25,7 @@ from marl_airhockey.learn.engine import (
     training_threads,
 )
 from marl_airhockey.learn.evaluate_policy import Metrics
+from marl_airhockey.learn.hindsight.buffer import GoalEndsReplayBuffer
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.network import FixedScale
 from marl_airhockey.learn.run import TrainingRun
@@ -31,6 +35,8 @@ from marl_airhockey.policies.torch_weights import policy_of_weights
 
 REPORT = 100
 """Steps of all worlds from one report of progress to the next"""
+BUFFERS = {"relabelled": GoalEndsReplayBuffer, "recorded": HerReplayBuffer}
+"""Buffers by the setting `ends`"""
 SAMPLE = 2000
 """Remembered states in which the exploration is measured"""
 
@@ -76,14 +82,24 @@ def _train(
     return row
 
 
-def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> SAC:
+def _algorithm(name: str) -> type[OffPolicyAlgorithm]:
+    """Return the class of an algorithm by the setting `critics`."""
+    if name == "mean":
+        return SAC
+    require("sb3_contrib", "ecosystem")
+    from sb3_contrib import TQC
+
+    return TQC
+
+
+def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> OffPolicyAlgorithm:
     """Return a fresh model, with the card of its policy as ``model.card``."""
     layout = env.world.observer.layout
     # An episode can be learned from when it has ended.
     first = max(config.learning_starts, config.num_worlds * env.world.max_cycles)
     if config.total_steps <= first:
         raise ValueError(f"total_steps: {config.total_steps} must be above {first}")
-    model = SAC(
+    model = _algorithm(config.critics)(
         "MultiInputPolicy",
         env,
         learning_rate=config.learning_rate,
@@ -94,7 +110,7 @@ def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> SAC:
         gamma=config.gamma,
         train_freq=1,
         gradient_steps=config.gradient_steps,
-        replay_buffer_class=HerReplayBuffer,
+        replay_buffer_class=BUFFERS[config.ends],
         replay_buffer_kwargs={"n_sampled_goal": config.relabelled},
         seed=config.seed,
         device="cpu",
@@ -111,10 +127,10 @@ def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> SAC:
     return model
 
 
-def _entropy(model: SAC) -> torch.Tensor:
+def _entropy(model: Any) -> torch.Tensor:
     """Return the logarithm of the weight of the entropy, which is learned."""
-    assert model.log_ent_coef is not None
-    return model.log_ent_coef
+    found: torch.Tensor = model.log_ent_coef
+    return found
 
 
 class Evaluations(BaseCallback):
@@ -134,14 +150,14 @@ class Evaluations(BaseCallback):
         note_step(self.logger, env.slots)
         if self.n_calls % REPORT == 0:
             self._update_progress()
-            started = self.num_timesteps > self._sac.learning_starts
+            started = self.num_timesteps > self._learner.learning_starts
             if self._run.evaluation_due and started:
                 self.evaluate()
         return True
 
     @property
-    def _sac(self) -> SAC:
-        assert isinstance(self.model, SAC)
+    def _learner(self) -> OffPolicyAlgorithm:
+        assert isinstance(self.model, OffPolicyAlgorithm)
         return self.model
 
     def _update_progress(self) -> None:
@@ -154,7 +170,7 @@ class Evaluations(BaseCallback):
 
     def _policy(self) -> NumpyPolicy:
         """Return the mean action of the policy as it is."""
-        model = self._sac
+        model = self._learner
         assert model.replay_buffer is not None
         card = {
             **vars(model)["card"],
@@ -162,7 +178,7 @@ class Evaluations(BaseCallback):
             "steps": self.num_timesteps,
             "bounded": True,
         }
-        actor: Any = model.actor
+        actor: Any = vars(model)["actor"]
         hidden = [f"latent_pi.{2 * k}" for k in range(len(self._run.config.hidden))]
         scale = actor.features_extractor.centre, 1.0 / actor.features_extractor.rate
         # Its exploration differs from state to state: what it is on the whole.
@@ -177,8 +193,8 @@ class Evaluations(BaseCallback):
         folder = self._run.folder
         draft = folder / f"part-{name}.pt"
         known = {
-            "model": self._sac.get_parameters(),
-            "entropy": _entropy(self._sac).detach(),
+            "model": self._learner.get_parameters(),
+            "entropy": _entropy(self._learner).detach(),
         }
         torch.save(known, draft)
         draft.replace(folder / f"{name}.pt")

@@ -1,4 +1,4 @@
-"""Actor: the policy that all offline algorithms learn, and what they owe."""
+"""Actor: the policy that all offline algorithms learn, and what they must provide."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from torch import Tensor
 
 from marl_airhockey.learn.networks import HALF_LOG_TAU, GaussianActor
 from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.offline.dataset import Batch
 
 
 class Algorithm(GaussianActor, ABC):
@@ -33,14 +34,13 @@ class Algorithm(GaussianActor, ABC):
         return density
 
     @abstractmethod
-    def losses(self, step: int, *batch: Tensor) -> dict[str, Tensor]:
+    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
         """Return the losses, whose sum is descended on, by name.
 
         Args:
-            step: number of the step, from 0.
-            *batch: observation (n, D) and next observation scaled, action (n, 2),
-                reward (n,) and going (n,), see `Dataset`, in the order of its `draw`.
+            step: Number of the step, from 0.
+            batch: Steps with scaled observations.
         """
 
-    def follow(self) -> None:
-        """Let targets follow, after a step; an algorithm without them has none."""
+    def update_targets(self, step: int) -> None:
+        """Update target networks after a step; without them, do nothing."""

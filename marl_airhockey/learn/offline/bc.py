@@ -6,14 +6,14 @@ import torch
 from torch import Tensor
 
 from marl_airhockey.learn.offline.actor import Algorithm
+from marl_airhockey.learn.offline.dataset import Batch
 
 
 class BehaviourCloning(Algorithm):
     """Behaviour cloning; ``share`` below 1 clones the best episodes alone."""
 
-    def losses(self, step: int, *batch: Tensor) -> dict[str, Tensor]:
-        observation, action, *_ = batch
-        error = (self.actor(observation) - action).square()
+    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
+        error = (self.actor(batch.observation) - batch.action).square()
         # The deviation is that of the errors; the actor does not care.
         spread = torch.exp(2 * self.log_std)
         deviation = (error.detach().mean(0) / spread / 2 + self.log_std).sum()

@@ -13,8 +13,8 @@ from marl_airhockey.data.files import recordings_in, shared_head
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
 
-STEPS = {"bc": 20_000, "iql": 20_000}
-"""Gradient steps of each algorithm, unless told otherwise"""
+STEPS = {"bc": 20_000, "iql": 40_000, "td3_bc": 40_000, "rebrac": 40_000}
+"""Gradient steps of each algorithm, unless others are given"""
 ALGORITHMS = tuple(STEPS)
 """Names of the algorithms, which are those of their files"""
 
@@ -48,7 +48,19 @@ class OfflineConfig(RunConfig):
     temperature: float = 3.0
     """Of IQL: how much better actions count more, per unit of advantage"""
     tau: float = 0.005
-    """Of IQL: share by which targets follow in a step"""
+    """Fraction by which targets move toward their networks in a step"""
+    alpha: float = 2.5
+    """Of TD3+BC: weight of the value against that of cloning"""
+    actor_penalty: float = 0.1
+    """Of ReBRAC: weight of the squared distance of actions from those of the data"""
+    critic_penalty: float = 0.01
+    """Of ReBRAC: the same in the target of the critics"""
+    policy_delay: int = 2
+    """Of TD3+BC and ReBRAC: steps of the critics for each of the actor"""
+    target_noise: float = 0.2
+    """Of TD3+BC and ReBRAC: standard deviation of the noise of target actions"""
+    noise_clip: float = 0.5
+    """Of TD3+BC and ReBRAC: largest magnitude of that noise"""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -82,6 +94,7 @@ def offline_config(
     check_names(OfflineConfig, changes)
     files = recordings_in([built(path) for path in data])
     head = shared_head(files)
+    goals = {"goals": head["goals"]} if "goals" in head else {}
     for name in ("scenario", "options", "observe", "control_dt"):
         if name in changes and changes[name] != head[name]:
             raise ValueError(
@@ -95,7 +108,7 @@ def offline_config(
     }
     settings = {
         "scenario": head["scenario"],
-        "options": head["options"],
+        "options": {**head["options"], **goals},
         "observe": head["observe"],
         "control_dt": head["control_dt"],
         "profile": head["profile"],

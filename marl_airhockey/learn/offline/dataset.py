@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -14,38 +15,47 @@ from marl_airhockey.core.recording import RecordedEpisode
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.types import Array
 
-NEEDED = ("observation", "observation.desired_goal", "action", "reward", "terminated")
+GOALS = tuple(
+    f"observation.{part}" for part in ("observation", "achieved_goal", "desired_goal")
+)
+"""Columns of observations with goals apart, in the order in which they are joined"""
+NEEDED = ("observation", *GOALS, "action", "reward", "terminated")
 """Columns that are read"""
+
+
+class Batch(NamedTuple):
+    """Batch of n steps of one seat."""
+
+    observation: Tensor
+    """(n, D)"""
+    action: Tensor
+    """(n, 2), in -1 .. 1"""
+    reward: Tensor
+    """(n,), divided by the dataset's `reward_scale`"""
+    next_observation: Tensor
+    """(n, D)"""
+    next_action: Tensor
+    """(n, 2) action of the next step; of the last step of an episode, its own"""
+    not_done: Tensor
+    """(n,) 0 where the step was terminated, else 1, at a time limit, too"""
 
 
 @dataclass(frozen=True)
 class Dataset:
     """Dataset of N steps of one seat."""
 
-    observation: Tensor
-    """(N, D)"""
-    action: Tensor
-    """(N, 2), in -1 .. 1"""
-    reward: Tensor
-    """(N,), divided by `reward_scale`"""
-    next_observation: Tensor
-    """(N, D)"""
-    going: Tensor
-    """(N,) 0 where the game ended with the step, for a reason inside it; else 1"""
+    steps: Batch
+    """All N steps"""
     reward_scale: float
     """Standard deviation of the discounted returns from all steps on"""
 
     def __len__(self) -> int:
-        return len(self.action)
+        return len(self.steps.action)
 
-    def draw(self, count: int) -> tuple[Tensor, ...]:
-        """Return ``count`` steps, drawn with replacement: all five arrays."""
+    def sample(self, count: int) -> Batch:
+        """Return ``count`` steps, sampled with replacement."""
         rows = torch.randint(len(self), (count,))
-        arrays = (
-            *(self.observation, self.action, self.reward),
-            *(self.next_observation, self.going),
-        )
-        return tuple(x.index_select(0, rows) for x in arrays)
+        return Batch(*(x.index_select(0, rows) for x in self.steps))
 
 
 def load_dataset(
@@ -77,14 +87,15 @@ def load_dataset(
         joined = np.concatenate([parts[name] for parts in kept])
         return torch.from_numpy(joined.astype(np.float32))
 
-    return Dataset(
+    steps = Batch(
         observation=tensor("observation"),
         action=tensor("action").clamp(-1.0, 1.0),
         reward=tensor("reward") / scale,
         next_observation=tensor("next_observation"),
-        going=tensor("going"),
-        reward_scale=scale,
+        next_action=tensor("next_action").clamp(-1.0, 1.0),
+        not_done=tensor("not_done"),
     )
+    return Dataset(steps, scale)
 
 
 def _episodes(files: Sequence[Path]) -> Iterator[tuple[Path, RecordedEpisode]]:
@@ -99,10 +110,11 @@ def _seat_of(
 ) -> dict[str, Array]:
     """Return the steps of a seat in an episode."""
     columns, where = episode.columns, f"{path}: episode {episode.index}"
-    if "observation" not in columns:
-        kept = "goals are apart" if "observation.desired_goal" in columns else "none"
-        raise ValueError(f"{where}: there are no flat observations in it ({kept})")
-    shown = np.concatenate([episode.first["observation"][None], columns["observation"]])
+    names = ("observation",) if "observation" in columns else GOALS
+    if not all(name in columns for name in names):
+        raise ValueError(f"{where}: there are no observations in it")
+    parts = [np.concatenate([episode.first[n][None], columns[n]]) for n in names]
+    shown = np.concatenate(parts, -1)
     if shown.shape[2] != size:
         raise ValueError(
             f"{where}: observations have {shown.shape[2]} elements, the scenario's "
@@ -110,12 +122,14 @@ def _seat_of(
         )
     if seat >= shown.shape[1]:
         raise ValueError(f"{where}: there is no seat {seat}")
+    action = columns["action"][:, seat]
     return {
         "observation": shown[:-1, seat],
         "next_observation": shown[1:, seat],
-        "action": columns["action"][:, seat],
+        "action": action,
+        "next_action": np.concatenate([action[1:], action[-1:]]),
         "reward": columns["reward"][:, seat],
-        "going": 1.0 - columns["terminated"],
+        "not_done": 1.0 - columns["terminated"],
     }
 
 

@@ -12,9 +12,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from marl_airhockey.learn.networks import TwinLayers, linear_layers
+from marl_airhockey.learn.networks import TwinLayers, linear_layers, move_toward
 from marl_airhockey.learn.offline.actor import Algorithm
 from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.offline.dataset import Batch
 
 LARGEST_WEIGHT = 100.0
 """Largest weight of an action, as in the paper"""
@@ -30,12 +31,12 @@ class ImplicitQLearning(Algorithm):
         self.critics = TwinLayers([size + 2, *config.hidden, 1])
         self.targets = deepcopy(self.critics).requires_grad_(False)
 
-    def losses(self, step: int, *batch: Tensor) -> dict[str, Tensor]:
-        observation, action, reward, after, going = batch
+    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
+        observation, action, reward, after, _, not_done = batch
         both = torch.cat([observation, action], -1)
         with torch.no_grad():
             target = self.targets(both).amin(0)
-            ahead = reward + self.config.gamma * going * self.value(after)[:, 0]
+            ahead = reward + self.config.gamma * not_done * self.value(after)[:, 0]
         value = self.value(observation)[:, 0]
         advantage = target - value
         weight = torch.exp(self.config.temperature * advantage.detach())
@@ -49,11 +50,8 @@ class ImplicitQLearning(Algorithm):
             "actor": -(weight.clamp(max=LARGEST_WEIGHT) * density).mean(),
         }
 
-    @torch.no_grad()
-    def follow(self) -> None:
-        pairs = zip(self.targets.parameters(), self.critics.parameters(), strict=True)
-        for target, critic in pairs:
-            target.lerp_(critic, self.config.tau)
+    def update_targets(self, step: int) -> None:
+        move_toward(self.targets, self.critics, self.config.tau)
 
 
 make = ImplicitQLearning

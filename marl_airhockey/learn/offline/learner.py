@@ -87,21 +87,20 @@ class Learner:
     def descend(self, step: int) -> dict[str, float]:
         """Descend once on a batch of steps; return the losses."""
         model = self.model
-        observation, action, reward, after, going = self._data.draw(
-            self._config.batch_size
-        )
+        batch = self._data.sample(self._config.batch_size)
         # Half a cosine, to nothing at the end (Kostrikov et al., for the actor).
         rate = 0.5 * (1.0 + math.cos(math.pi * step / self._config.total_steps))
         for group in self._optimizer.param_groups:
             group["lr"] = self._config.learning_rate * rate
-        losses = model.losses(
-            *(step, model.scaled(observation), action, reward),
-            *(model.scaled(after), going),
+        scaled = batch._replace(
+            observation=model.scaled(batch.observation),
+            next_observation=model.scaled(batch.next_observation),
         )
+        losses = model.losses(step, scaled)
         self._optimizer.zero_grad(set_to_none=True)
         torch.stack(list(losses.values())).sum().backward()  # type: ignore[no-untyped-call]
         self._optimizer.step()
-        model.follow()
+        model.update_targets(step)
         return {name: float(loss.detach()) for name, loss in losses.items()}
 
     def policy(self) -> NumpyPolicy:

@@ -1,0 +1,136 @@
+"""Hindsight: recorded play as data of goals that were reached in it.
+
+An episode that missed its goal reached others (Andrychowicz et al., 2017). Copies of it
+get such a goal, end where it is reached first, and are successes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.core.recording import PLAYED, Columns, Recording
+from marl_airhockey.data.columns import first_columns, step_columns
+from marl_airhockey.data.reader import episodes_of, read_head
+from marl_airhockey.data.relabel import batches, new_head
+from marl_airhockey.data.replay import Replay
+from marl_airhockey.data.writer import RecordingWriter, whole_recording
+from marl_airhockey.registry import make_scenario
+from marl_airhockey.types import Array
+
+ACHIEVED, DESIRED = "observation.achieved_goal", "observation.desired_goal"
+DROPPED = ("memory.", "term.")
+"""Beginnings of columns that follow from the former goal"""
+
+
+def with_hindsight(
+    path: Path, scenario: str, out: Path, copies: int = 4, seed: int = 0
+) -> Path:
+    """Write a recording as episodes of a goal task that reach their goals.
+
+    Observations have goals apart, as with goals="dict". Each copy of an episode has a
+    goal that is sampled, uniformly, from those that it reached.
+
+    Args:
+        path: Recording.
+        scenario: Name of a task with goals, and with the bodies of the recorded one.
+        out: Folder of the new recording.
+        copies: Number of copies of each episode.
+        seed: Seed of the goals.
+
+    Returns:
+        ``out``.
+
+    Raises:
+        ValueError: A scenario without goals, one with other bodies, or a recording in
+            which no goal was reached.
+    """
+    head = read_head(path)
+    new = new_head(head, scenario, {"goals": "dict"})
+    game = make_scenario(scenario, **new["options"])
+    assert isinstance(game, GoalScenario), "others refuse goals='dict'"
+    rng = np.random.default_rng(seed)
+    with whole_recording(out, {**new, "hindsight": copies}) as writer:
+        for batch in batches(episodes_of(path)):
+            replay = Replay(Recording(path, head, batch), game)
+            for first, columns, number in _replayed(replay):
+                episode = batch[number]
+                given = episode.seed, episode.number, episode.physics
+                for _ in range(copies):
+                    found = _copy(game, first, columns, rng)
+                    if found is not None:
+                        _write(writer, *found, given)
+        if not writer.episodes:
+            raise ValueError(f"{path}: no goal of {scenario} was reached in it")
+    return out
+
+
+def _replayed(replay: Replay) -> list[tuple[Columns, Columns, int]]:
+    """Return the columns before and after the steps of each episode, and its index."""
+    replay.begin()
+    first, rows = first_columns(replay.world), []
+    for t in range(int(replay.lengths.max())):
+        replay.step(t)
+        rows.append(step_columns(replay.world))
+    whole = {n: np.stack([row[n] for row in rows], 1) for n in rows[0] if _kept(n)}
+    return [
+        (
+            {name: value[i] for name, value in first.items() if _kept(name)},
+            {name: value[i, :length] for name, value in whole.items()},
+            i,
+        )
+        for i, length in enumerate(replay.lengths)
+    ]
+
+
+def _kept(name: str) -> bool:
+    return not name.startswith(DROPPED)
+
+
+def _copy(
+    game: GoalScenario, first: Columns, columns: Columns, rng: np.random.Generator
+) -> tuple[Columns, Columns] | None:
+    """Return an episode with another goal; None if it reached none.
+
+    A goal must not be met at the start, and it must be one that can be met at all.
+    """
+    start, achieved = first[ACHIEVED][0], columns[ACHIEVED][:, 0]
+    fits = game.goal_reward(achieved, achieved) > 0
+    fits &= game.goal_reward(np.broadcast_to(start, achieved.shape), achieved) == 0
+    if not fits.any():
+        return None
+    goal = achieved[rng.choice(np.flatnonzero(fits))]
+    met = game.goal_reward(achieved, np.broadcast_to(goal, achieved.shape)) > 0
+    end = int(np.argmax(met)) + 1
+    return {**first, DESIRED: _as(goal, first[DESIRED])}, {
+        **{name: values[:end] for name, values in columns.items()},
+        DESIRED: _as(goal, columns[DESIRED][:end]),
+        **_ends(met[:end]),
+    }
+
+
+def _as(goal: Array, like: Array) -> Array:
+    return np.broadcast_to(goal, like.shape).astype(like.dtype)
+
+
+def _ends(met: Array) -> dict[str, Any]:
+    """Return rewards and ends (T,) of an episode whose last step meets its goal."""
+    reward = met.astype(np.float64)[:, None]
+    return {
+        "reward": reward,
+        "returns": np.cumsum(reward, axis=0),
+        "success": met[:, None],
+        "terminated": met,
+        "truncated": np.zeros(len(met), np.bool_),
+    }
+
+
+def _write(
+    writer: RecordingWriter, first: Columns, columns: Columns, given: tuple[Any, ...]
+) -> None:
+    writer.begin(first, *given)
+    writer.add_rows(columns)
+    writer.end(PLAYED)
