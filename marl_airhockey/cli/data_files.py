@@ -49,8 +49,9 @@ def split(
 ) -> None:
     """Divide the episodes of a recording into two, at random."""
     from marl_airhockey.data.derived import divided
+    from marl_airhockey.data.files import one_recording
 
-    show(divided(recording, out, test, seed), False)
+    show(divided(one_recording(recording), out, test, seed), False)
 
 
 def relabel(
@@ -70,9 +71,11 @@ def relabel(
     ] = 0,
 ) -> None:
     """Write a recording as data of other tasks with the same bodies, by name."""
+    from marl_airhockey.data.files import one_recording
     from marl_airhockey.data.hindsight import with_hindsight
     from marl_airhockey.data.relabel import fitting, relabelled
 
+    recording = one_recording(recording)
     names = task or fitting(recording)
     if hindsight:
         paths = [with_hindsight(recording, n, out / n, hindsight) for n in names]

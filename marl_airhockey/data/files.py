@@ -60,6 +60,19 @@ def recordings_in(paths: Sequence[Path]) -> list[Path]:
     return found
 
 
+def one_recording(path: Path) -> Path:
+    """Return the only recording of a path, a folder or a named dataset.
+
+    Raises:
+        ValueError: There is none, or there are several.
+    """
+    found = recordings_in([path])
+    if len(found) > 1:
+        names = ", ".join(shown_name(each) for each in found[:4])
+        raise ValueError(f"{path}: there are several recordings; name one: {names}")
+    return found[0]
+
+
 def new_recording(folder: Path, scenario: str) -> Path:
     """Return a path for a new recording in a folder, named by the time."""
     now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%d-%H%M%S-%f")

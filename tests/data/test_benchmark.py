@@ -25,7 +25,7 @@ from marl_airhockey.data.benchmark.content import (
     reference_returns,
 )
 from marl_airhockey.data.benchmark.synthetic import SyntheticHuman
-from marl_airhockey.data.files import recordings_in
+from marl_airhockey.data.files import one_recording, recordings_in
 from marl_airhockey.data.reader import read_head
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import make_agent
@@ -102,6 +102,10 @@ def test_names_of_built_datasets_are_paths_of_recordings(tmp_path, monkeypatch):
     build_dataset(find_dataset(NAME), tmp_path / "datasets" / NAME, 500)
     assert len(recordings_in([type(tmp_path)(NAME)])) == 4
     assert built(NAME) == tmp_path / "datasets" / NAME
+    with pytest.raises(ValueError, match="several recordings; name one: airhockey/"):
+        one_recording(type(tmp_path)(NAME))
+    part = type(tmp_path)(f"{NAME}/random")
+    assert one_recording(part) == tmp_path / "datasets" / part
     with pytest.raises(
         ValueError,
         match="unknown dataset 'airhockey/touch/best-v0'; near it are airhockey/touch/",

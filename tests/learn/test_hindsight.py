@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 import marl_airhockey as ah
 from marl_airhockey.cli.main import app
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.learn.hindsight.config import hindsight_config
-from marl_airhockey.learn.hindsight.sac import Evaluations, build_model
+from marl_airhockey.learn.hindsight.config import CHOICES, hindsight_config
+from marl_airhockey.learn.hindsight.sac import BUFFERS, Evaluations, build_model
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.train import load_any_config, run_training
 from marl_airhockey.policies.load import load_policy
@@ -78,3 +78,37 @@ def test_the_command_refuses_recordings(tmp_path):
     command = ["train", "reach", "--algo", "sac_her", "--data", str(tmp_path)]
     with pytest.raises(ValueError, match="sac_her learns by playing"):
         CliRunner().invoke(app, command, catch_exceptions=False)
+
+
+def samples_of(**changes):
+    """Rewards and terminations (n,) of steps that a buffer has relabelled, or not."""
+    config = hindsight_config("reach_velocity", SMALL | changes)
+    env = ah.make_sb3_vec("reach_velocity", 4, **config.keywords)
+    model = build_model(config, env)
+    model.learn(1200)
+    found = model.replay_buffer.sample(4000)
+    env.close()
+    return found.rewards[:, 0] > 0, found.dones[:, 0] > 0
+
+
+def test_relabelled_steps_end_where_they_meet_their_goal():
+    met, done = samples_of()
+    assert 0.01 < met.float().mean() < 0.99
+    assert (met == done).all()
+    met, done = samples_of(ends="recorded")
+    assert (met != done).float().mean() > 0.01
+
+
+def test_settings_of_hindsight_are_checked():
+    assert CHOICES["ends"] == tuple(BUFFERS)
+    for name in CHOICES:
+        with pytest.raises(ValueError, match=f"unknown {name} 'none'"):
+            hindsight_config("reach", SMALL | {name: "none"})
+
+
+def test_quantile_critics_learn_a_policy_of_the_same_form(tmp_path):
+    pytest.importorskip("sb3_contrib")
+    config = hindsight_config("reach", SMALL | {"critics": "quantiles"})
+    run_training(config, tmp_path / "run")
+    policy = load_policy(tmp_path / "run")
+    assert evaluate(policy, "reach", episodes=5, goals="dict").episodes == 5

@@ -92,11 +92,13 @@ def test_a_share_is_that_of_the_best_episodes(mixed):
 
 @pytest.mark.parametrize("algo", ALGORITHMS)
 def test_what_an_expert_did_is_learned(algo, expert, tmp_path):
-    config = offline_config(algo, [expert], SMALL)
+    more = {"td3_bc": 6000, "rebrac": 6000}
+    steps = more.get(algo, SMALL["total_steps"])
+    config = offline_config(algo, [expert], SMALL | {"total_steps": steps})
     assert config.scenario == "reach"
     row = run_training(config, tmp_path / "run")
     assert row["success"] >= 0.9
-    assert row["steps"] == SMALL["total_steps"]
+    assert row["steps"] == steps
     assert load_any_config(tmp_path / "run") == config
     driver = ah.make_agent(tmp_path / "run")
     assert evaluate(driver, "reach", episodes=50).success >= 0.9

@@ -21,7 +21,7 @@ from marl_airhockey.learn.offline.rebrac import ReBRAC
 from marl_airhockey.learn.offline.td3_bc import TD3BC
 from marl_airhockey.registry import make_agent
 
-SMALL = {"hidden": [64, 64]}
+SMALL = {"hidden": [64, 64], "alpha": 2.5}
 SIZE = 8
 """Numbers of an observation of reach"""
 VALUE = {"in_keys": ["observation", "action"], "out_keys": ["state_action_value"]}

@@ -49,9 +49,10 @@ class OfflineConfig(RunConfig):
     """Of IQL: how much better actions count more, per unit of advantage"""
     tau: float = 0.005
     """Fraction by which targets move toward their networks in a step"""
-    alpha: float = 2.5
-    """Of TD3+BC: weight of the value against that of cloning"""
-    actor_penalty: float = 0.1
+    alpha: float = 0.2
+    """Of TD3+BC: weight of the value against that of cloning. The authors have 2.5; in
+    tasks that need precise actions, as reach, it leads the actor away from the data"""
+    actor_penalty: float = 2.0
     """Of ReBRAC: weight of the squared distance of actions from those of the data"""
     critic_penalty: float = 0.01
     """Of ReBRAC: the same in the target of the critics"""

@@ -7,8 +7,10 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import torch
 
+from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
     save_weights,
@@ -21,10 +23,21 @@ from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.types import Array
 from marl_airhockey.world.build import build_world
+from marl_airhockey.world.world import World
 
 REPORT = 500
 """Steps from one report of progress to the next"""
+
+
+def scale_of(world: World) -> tuple[Array, Array]:
+    """Return centre and unit (D,) of observations; goals apart have 0 and 1."""
+    layout, scenario = world.observer.layout, world.scenario
+    if not (isinstance(scenario, GoalScenario) and scenario.goals == "dict"):
+        return layout.centre, layout.unit
+    goals = np.zeros(2 * len(scenario.goal_bounds), np.float32)
+    return np.append(layout.centre, goals), np.append(layout.unit, goals + 1)
 
 
 class Learner:
@@ -42,17 +55,18 @@ class Learner:
         self._run = run
         world = build_world(config.scenario, 1, True, config.keywords)
         layout = world.observer.layout
+        centre, unit = scale_of(world)
         world.close()
         self._card = config.card(layout.labels)
         files = [Path(path) for path in config.data]
-        shape = config.seat, config.share, config.gamma, len(layout.centre)
+        shape = config.seat, config.share, config.gamma, len(centre)
         self._data = load_dataset(files, *shape)
         # A resumed run draws other steps than those of its beginning.
         torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
         make: Callable[[OfflineConfig, object, object], Algorithm] = import_module(
             f"marl_airhockey.learn.offline.{config.algo}"
         ).make
-        self.model = make(config, layout.centre, layout.unit)
+        self.model = make(config, centre, unit)
         learned = [p for p in self.model.parameters() if p.requires_grad]
         self._optimizer = torch.optim.Adam(learned, config.learning_rate, fused=True)
         if run.progress.steps:

@@ -1,0 +1,105 @@
+"""SAC with hindsight goals, with terminations of the new and of the former goals.
+
+    python scripts/reproduce/hindsight.py --tasks reach,reach_velocity --seeds 1
+
+A run that ends adds a row to ``docs/data/hindsight.csv``: success of the last policy
+over 500 test seeds, steps, CPU-minutes, and the first evaluation with a success of 0.9.
+A run whose row is there is not trained again, and one that was cut off resumes.
+"""
+
+from __future__ import annotations
+
+import csv
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.learn.hindsight.config import CHOICES, hindsight_config
+from marl_airhockey.learn.train import run_training
+from marl_airhockey.policies.load import load_policy
+
+STEPS = {
+    "reach": 60_000,
+    "reach_velocity": 200_000,
+    "hit_goal": 300_000,
+    "hit_goal_velocity": 300_000,
+}
+"""Steps of worlds by task"""
+ROWS = Path(__file__).parents[2] / "docs" / "data" / "hindsight.csv"
+KEY = ("task", "ends", "seed")
+EPISODES = 500
+Row = dict[str, Any]
+
+
+def train_run(task: str, ends: str, seed: int, folder: Path) -> Row:
+    """Train one run and return its row."""
+    steps = STEPS[task]
+    changes = {"total_steps": steps, "ends": ends, "seed": seed, "evaluations": 12}
+    config = hindsight_config(task, changes)
+    place = folder / f"{task}-{ends}-{seed}"
+    row = run_training(None if (place / "config.toml").exists() else config, place)
+    policy = load_policy(place / "last.npz")
+    found = evaluate(
+        policy, task, episodes=EPISODES, name=task, exact=True, **config.keywords
+    )
+    reached = [
+        each
+        for each in read(place / "evaluations.csv")
+        if float(each["success"]) >= 0.9
+    ]
+    return {
+        **dict(zip(KEY, (task, ends, seed), strict=True)),
+        "success": round(found.success, 4),
+        "steps": int(row["steps"]),
+        "cpu_minutes": round(row["learning_cpu_seconds"] / 60, 1),
+        "steps_to_0.9": int(float(reached[0]["steps"])) if reached else "",
+    }
+
+
+def read(path: Path) -> list[Row]:
+    """Return the rows of a CSV file; none if there is no file."""
+    if not path.exists():
+        return []
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def keep(row: Row) -> None:
+    """Add a row to those there are, in order."""
+    rows = [*read(ROWS), {name: str(value) for name, value in row.items()}]
+    rows.sort(key=lambda r: (list(STEPS).index(r["task"]), r["ends"], r["seed"]))
+    with ROWS.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(row), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def main(
+    tasks: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(STEPS),
+    seeds: Annotated[int, typer.Option(help="Runs of each kind.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Runs at a time.")] = 2,
+    folder: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
+        "runs/hindsight"
+    ),
+) -> None:
+    """Train what has no row yet."""
+    known = {tuple(row[name] for name in KEY) for row in read(ROWS)}
+    wanted = [
+        (task, ends, seed)
+        for seed in range(seeds)
+        for task in tasks.split(",")
+        for ends in CHOICES["ends"]
+        if (task, ends, str(seed)) not in known
+    ]
+    with ProcessPoolExecutor(jobs) as pool:
+        runs = [pool.submit(train_run, *run, folder) for run in wanted]
+        for run in as_completed(runs):
+            keep(run.result())
+            print(run.result(), flush=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)

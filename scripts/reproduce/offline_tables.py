@@ -1,0 +1,181 @@
+"""Tables and picture of learning from data: the rows of `table.py`, beside the paper.
+
+    python scripts/reproduce/offline_tables.py
+    python scripts/reproduce/offline_tables.py --plot docs/images/table.png
+
+RL is that of ``reproduce/tasks.py`` (columns success and arm of ``tasks.csv``) and, in
+the lab, of ``bench/lab_tasks.py``; chance is the success of random actions. The paper's
+figures (arXiv 2405.03113) are of its own rules, physics and data.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from marl_airhockey.data.benchmark.content import published
+from marl_airhockey.evaluation.stats import interval
+
+DATA = Path(__file__).parents[2] / "docs" / "data"
+"""Folder of the committed rows"""
+Paper = tuple[float | None, float | None, float | None]
+PAPER: dict[str, dict[str, Paper]] = {
+    "2d": {
+        "reach": (0.9, 1.0, 1.0),
+        "reach_velocity": (0.8, 1.0, 1.0),
+        "touch": (1.0, 1.0, 1.0),
+        "strike": (0.7, 1.0, 1.0),
+        "strike_crowd": (0.3, 1.0, 1.0),
+        "juggle": (0.3, 1.0, 1.0),
+        "puck_velocity": (0.7, 1.0, 1.0),
+        "move_block": (0.0, 0.0, 0.0),
+        "hit_goal": (0.1, 0.4, 0.9),
+        "hit_goal_velocity": (0.0, 0.0, 0.0),
+    },
+    "robosuite": {
+        "reach": (0.9, 0.9, 1.0),
+        "reach_velocity": (0.8, 0.9, 1.0),
+        "touch": (0.8, 0.8, 1.0),
+        "juggle": (0.6, 0.7, 0.9),
+        "puck_velocity": (0.6, 0.8, 0.9),
+        "hit_goal": (0.1, 0.1, 0.2),
+    },
+    "lab": {
+        "reach": (0.9, 1.0, None),
+        "reach_velocity": (0.1, 0.0, None),
+        "touch": (0.3, 0.6, None),
+        "juggle": (None, None, None),
+        "puck_velocity": (0.1, 0.3, None),
+    },
+}
+"""Success of BC, IQL and RL in the paper by domain and task; None without a figure"""
+COLUMNS = {"2d": ("success", 2000), "robosuite": ("arm", 200)}
+"""Column of ``tasks.csv`` with the success of RL, and its episodes of each seed"""
+ALGOS = ("bc", "bc10", "td3_bc", "iql", "rebrac")
+EXPERT = "expert"
+Row = dict[str, Any]
+
+
+def read(name: str) -> list[Row]:
+    """Return the rows of a CSV file."""
+    with (DATA / name).open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def success_of(rows: list[Row], *cell: str) -> tuple[float, int] | None:
+    """Return the mean success of a domain, tier, task and algorithm, and episodes."""
+    names = ("domain", "tier", "task", "algo")
+    own = [row for row in rows if tuple(row[name] for name in names) == cell]
+    if not own:
+        return None
+    mean = float(np.mean([float(row["success"]) for row in own]))
+    return mean, sum(int(row["episodes"]) for row in own)
+
+
+def rl_of(domain: str, task: str) -> tuple[float, int] | None:
+    """Return the mean success of RL, and its episodes."""
+    if domain == "lab":
+        found = [row for row in read("lab_tasks.csv") if row["task"] == task]
+        return float(found[0]["lab"].split()[0]), 20
+    column, episodes = COLUMNS[domain]
+    values = [
+        float(row[column])
+        for row in read("tasks.csv")
+        if (row["task"], row["profile"], row["variant"]) == (task, "ideal", "")
+    ]
+    return (float(np.mean(values)), episodes * len(values)) if values else None
+
+
+def shown(found: tuple[float, int] | None) -> str:
+    """Return a success with its 95 % interval over all episodes."""
+    if found is None:
+        return "-"
+    low, high = interval(*found)
+    return f"{found[0]:.3f} ({low:.3f} .. {high:.3f})"
+
+
+def table_of(domain: str, rows: list[Row]) -> list[list[str]]:
+    """Return the cells of a domain's table, the header first."""
+    found = [["task", "chance", "BC", "IQL", "RL", "paper: BC, IQL, RL"]]
+    for task, paper in PAPER[domain].items():
+        cells = [success_of(rows, domain, EXPERT, task, a) for a in ("bc", "iql")]
+        figures = ", ".join("-" if x is None else f"{x:.1f}" for x in paper)
+        chance = f"{published()[f'airhockey/{task}/random-v0'].success:.2f}"
+        each = map(shown, (*cells, rl_of(domain, task)))
+        found.append([task, chance, *each, figures])
+    return found
+
+
+def tier_table(tier: str, rows: list[Row]) -> list[list[str]]:
+    """Return the cells of the table of a tier in 2d, the header first."""
+    tasks = dict.fromkeys(row["task"] for row in rows if row["tier"] == tier)
+    return [
+        ["task", *ALGOS],
+        *(
+            [t, *(shown(success_of(rows, "2d", tier, t, a)) for a in ALGOS)]
+            for t in tasks
+        ),
+    ]
+
+
+def tables_of(rows: list[Row]) -> dict[str, list[list[str]]]:
+    """Return the tables of the domains and tiers that have rows, by title."""
+    domains = dict.fromkeys(row["domain"] for row in rows)
+    tiers = dict.fromkeys(row["tier"] for row in rows if row["tier"] != EXPERT)
+    return {
+        **{domain: table_of(domain, rows) for domain in domains},
+        **{tier: tier_table(tier, rows) for tier in tiers},
+    }
+
+
+def plot(rows: list[Row], path: Path) -> None:
+    """Draw our success in 2d as bars, the paper's as marks, chance as lines."""
+    import matplotlib.pyplot as plt
+
+    tasks, width = list(PAPER["2d"]), 0.26
+    figure, axes = plt.subplots(figsize=(10, 3.6), layout="constrained")
+    for k, name in enumerate(("bc", "iql", "rl")):
+        ours = [
+            rl_of("2d", task)
+            if name == "rl"
+            else success_of(rows, "2d", EXPERT, task, name)
+            for task in tasks
+        ]
+        at = np.arange(len(tasks)) + (k - 1) * width
+        heights = [found[0] if found else 0.0 for found in ours]
+        axes.bar(at, heights, 0.9 * width, label=f"{name.upper()}, ours")
+        theirs = [PAPER["2d"][task][k] or 0.0 for task in tasks]
+        label = "the paper" if k == 2 else "_"
+        axes.plot(at, theirs, "k_", markersize=11, markeredgewidth=2, label=label)
+    for k, task in enumerate(tasks):
+        chance = published()[f"airhockey/{task}/random-v0"].success
+        label = "chance" if k == 0 else "_"
+        axes.hlines(chance, k - 0.45, k + 0.45, "grey", "dotted", label=label)
+    axes.set_xticks(range(len(tasks)), [t.replace("_", "\n") for t in tasks])
+    axes.set_ylabel("success")
+    axes.legend(ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+    figure.savefig(path, dpi=120)
+
+
+def main(
+    picture: Annotated[
+        Path | None, typer.Option("--plot", help="Picture to write, PNG.")
+    ] = None,
+) -> None:
+    """Print the tables in Markdown, or draw the picture."""
+    rows = read("offline.csv")
+    if picture is not None:
+        plot(rows, picture)
+        return
+    for title, (header, *lines) in tables_of(rows).items():
+        print(f"\n{title}\n")
+        for cells in (header, ["---"] * len(header), *lines):
+            print(f"| {' | '.join(cells)} |")
+
+
+if __name__ == "__main__":
+    typer.run(main)
