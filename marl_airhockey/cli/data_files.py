@@ -72,12 +72,13 @@ def relabel(
 ) -> None:
     """Write a recording as data of other tasks with the same bodies, by name."""
     from marl_airhockey.data.files import one_recording
-    from marl_airhockey.data.hindsight import with_hindsight
+    from marl_airhockey.data.hindsight import has_goals, with_hindsight
     from marl_airhockey.data.relabel import fitting, relabelled
 
     recording = one_recording(recording)
     names = task or fitting(recording)
     if hindsight:
+        names = task or [name for name in names if has_goals(name)]
         paths = [with_hindsight(recording, n, out / n, hindsight) for n in names]
     else:
         paths = [relabelled(recording, name, out / name) for name in names]
@@ -141,7 +142,8 @@ def export(
         str, typer.Option(help="Format: minari, lerobot, hdf5 or rows.")
     ] = "minari",
     seat: Annotated[
-        int, typer.Option(help="Seat whose steps are written; -1 for all, by agent.")
+        int,
+        typer.Option(help="Seat whose steps are written; -1 for all.", min=-1),
     ] = 0,
     out: Annotated[
         Path | None,

@@ -56,7 +56,10 @@ def train(
         Path | None, typer.Option(help="Begin with the weights of this run.")
     ] = None,
     algo: Annotated[
-        str, typer.Option(help="ppo; sac_her; bc and iql learn from --data.")
+        str,
+        typer.Option(
+            help="ppo; sac_her; bc, iql, td3_bc and rebrac learn from --data."
+        ),
     ] = "ppo",
     data: Annotated[
         list[Path] | None,

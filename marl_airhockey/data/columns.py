@@ -152,7 +152,11 @@ def scenario_of(recording: Recording) -> Scenario:
         raise ValueError(f"{recording.path}: {error}") from error
     bodies = len(scenario.scene.bodies)
     for episode in recording.episodes:
-        found = episode.first.get(STATE + "position", np.zeros((0, 2)))
+        if STATE + "position" not in episode.first:
+            raise ValueError(
+                f"{recording.path}: there are no states in it, as in datasets of others"
+            )
+        found = episode.first[STATE + "position"]
         if found.shape != (bodies, 2):
             raise ValueError(
                 f"{recording.path}: it has {len(found)} bodies and the scenario "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -14,6 +15,8 @@ from marl_airhockey.core.recording import META
 from marl_airhockey.data.reader import read_head
 from marl_airhockey.jit.cache import cache_folder
 
+NAME = re.compile(r"^\w[-.\w]*(/\w[-.\w]*)*$")
+"""Form of the name of an exported dataset"""
 PREFIX = "airhockey"
 """First part of the names of the named datasets"""
 ALIKE = ("scenario", "options", "observe", "control_dt", "profile")
@@ -90,12 +93,32 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     if path.exists():
         raise ValueError(f"{path}: there is such a folder; name another")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-") as part:
-        made = Path(part) / path.name
-        made.mkdir()
-        yield made
-        shutil.move(str(made), path)
+    fresh = not path.parent.exists()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-")
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
+    try:
+        with draft as part:
+            made = Path(part) / path.name
+            made.mkdir()
+            yield made
+            shutil.move(str(made), path)
+    finally:
+        if fresh and not any(path.parent.iterdir()):
+            path.parent.rmdir()
+
+
+def named_folder(root: Path | None, name: str) -> Path:
+    """Return the folder of a dataset below that of all; None for ``datasets``.
+
+    Raises:
+        ValueError: The name is no path below it.
+    """
+    if not NAME.match(name):
+        raise ValueError(f"--name {name!r}: expected words and numbers, as juggle/mine")
+    return (root or Path("datasets")) / name
 
 
 def size_of(recording: Path) -> int:

@@ -48,10 +48,12 @@ def with_hindsight(
         ValueError: A scenario without goals, one with other bodies, or a recording in
             which no goal was reached.
     """
+    if not has_goals(scenario):
+        raise ValueError(f"{scenario}: it has no goals; leave out --hindsight")
     head = read_head(path)
     new = new_head(head, scenario, {"goals": "dict"})
     game = make_scenario(scenario, **new["options"])
-    assert isinstance(game, GoalScenario), "others refuse goals='dict'"
+    assert isinstance(game, GoalScenario)
     rng = np.random.default_rng(seed)
     with whole_recording(out, {**new, "hindsight": copies}) as writer:
         for batch in batches(episodes_of(path)):
@@ -66,6 +68,11 @@ def with_hindsight(
         if not writer.episodes:
             raise ValueError(f"{path}: no goal of {scenario} was reached in it")
     return out
+
+
+def has_goals(scenario: str) -> bool:
+    """Return whether a scenario has goals."""
+    return isinstance(make_scenario(scenario), GoalScenario)
 
 
 def _replayed(replay: Replay) -> list[tuple[Columns, Columns, int]]:

@@ -44,15 +44,20 @@ def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWr
     Raises:
         ValueError: There is such a folder.
     """
+    fresh = not path.parent.exists()
     try:
         writer = RecordingWriter(path, {**head, "columns": {}})
     except FileExistsError as error:
         raise ValueError(f"{path}: there is such a folder; name another") from error
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
     try:
         with writer:
             yield writer
     except BaseException:
         shutil.rmtree(path, ignore_errors=True)
+        if fresh and not any(path.parent.iterdir()):
+            path.parent.rmdir()
         raise
 
 

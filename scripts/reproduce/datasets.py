@@ -33,7 +33,7 @@ from marl_airhockey.data.benchmark.content import (
 
 ROWS = Path(__file__).parents[2] / "docs" / "data" / "datasets.csv"
 """File of the committed rows"""
-DIGITS = {"success": 4, "returns": 4, "megabytes": 1, "cpu_seconds": 1}
+DIGITS = {"success": 6, "returns": 4, "megabytes": 1, "cpu_seconds": 1}
 
 
 def measure(name: str, folder: Path) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def main(
         optimizer.step()
         follow.step()
         if (step + 1) % max(steps // 4, 1) == 0:
-            shown = {k: round(float(v), 3) for k, v in losses.items() if "loss" in k}
+            shown = {k: round(v.item(), 3) for k, v in losses.items() if "loss" in k}
             print(f"step {step + 1} of {steps}: {shown}")
     with torch.no_grad():
         location, _ = network(data["observation"])

@@ -130,7 +130,7 @@ def _add_frames(path, numbers):
 
 def made_file(path, columns=35, robot_frame=False, inverted=False, rows=40):
     """Write a file as the paper's authors describe theirs; return its rows."""
-    rng = np.random.default_rng(columns)
+    rng = np.random.default_rng(7)
     time = 1.7e9 + 0.05 * np.arange(rows)
     pose = np.full((rows, 6), (-0.5, 0.0, 0.3, 0.0, -3.06, 0.0))
     pose[:, :2] += 0.1 * np.sin(time[:, None] - time[0] + (0.0, 1.0))
@@ -153,15 +153,17 @@ def made_file(path, columns=35, robot_frame=False, inverted=False, rows=40):
         "target_pose": target,
         "puck": np.column_stack([puck - (OFFSET * robot_frame, 0), hidden ^ inverted]),
     }
-    missing = {35: (), 32: ("puck",), 31: ("safe", "puck")}[columns]
-    values = np.concatenate([parts[n] for n in FIELDS if n not in missing], 1)
+    missing = {35: (), 32: ("puck",), 31: ("safe", "puck"), "old": ("safe", "puck")}
+    kept = [parts[n] for n in FIELDS if n not in missing[columns]]
+    more = [np.zeros((rows, 1))] if columns == "old" else []
+    values = np.concatenate(kept + more, 1)
     with h5py.File(path, "w") as file:
         file["train_vals"] = values
         file["train_img"] = np.zeros((rows, 24, 32, 3), np.uint8)
     return values, parts, puck, hidden
 
 
-@pytest.mark.parametrize("columns", [35, 32, 31])
+@pytest.mark.parametrize("columns", [35, 32, 31, "old"])
 def test_authors_trajectories_come_back_as_they_were(tmp_path, columns):
     source = tmp_path / "trajectory_data7.hdf5"
     values, parts, *_ = made_file(source, columns)
@@ -250,10 +252,92 @@ def test_rows_without_a_paddle_come_back_without_one(tmp_path):
     assert (folder / "episode-00000.csv").read_text() == source.read_text()
 
 
+def test_contacts_of_measured_play_are_found_again(tmp_path):
+    path = recorded(tmp_path, "juggle", "zoo/juggle", 10)
+    folder = find_format("rows").export([path], "rows", tmp_path, 0)
+    measured = import_dataset(settings_for(folder, "juggle", tmp_path / "measured"))
+    again = relabelled(measured, "juggle", tmp_path / "again")
+    old, new = (read_recording(p).episodes for p in (path, again))
+    for one, two in zip(old, new, strict=True):
+        touched = [e.columns["state.touched"][:, 0, 0] for e in (one, two)]
+        assert abs(int(touched[0].sum()) - int(touched[1].sum())) <= 1
+        assert one.columns["success"][-1] == two.columns["success"][-1]
+        speed = np.abs(one.columns["state.velocity"] - two.columns["state.velocity"])
+        assert np.median(speed) < 0.05
+
+
+def test_truncated_lerobot_dataset_is_refused(tmp_path):
+    path, out = recorded(tmp_path, episodes=4), tmp_path / "new"
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    part = folder / "data/chunk-000/file-000.parquet"
+    table = pq.ParquetFile(part).read()
+    length = len(read_recording(path).episodes[-1])
+    for rows, words in (
+        (len(table) - 1, "episode 3: frames are missing"),
+        (len(table) - length, r"episodes are missing: \[3\]"),
+        (0, "episodes are missing"),
+    ):
+        pq.write_table(table.slice(0, rows), part)
+        with pytest.raises(ValueError, match=words):
+            import_dataset(settings_for(folder, "reach", out))
+    for name in ("action", "next.done", "frame_index", "episode_index"):
+        pq.write_table(table.drop_columns([name]), part)
+        with pytest.raises(ValueError, match=f"the column '{name}' is missing"):
+            import_dataset(settings_for(folder, "reach", out))
+    texts = table.drop_columns(["next.reward"])
+    pq.write_table(texts.append_column("next.reward", [["a"] * len(table)]), part)
+    with pytest.raises(ValueError, match=r"column 'next\.reward'"):
+        import_dataset(settings_for(folder, "reach", out))
+    info = folder / "meta/info.json"
+    for text, words in (
+        ("[1]", "expected an object"),
+        ('{"codebase_version": 1}', "v3"),
+    ):
+        info.write_text(text)
+        with pytest.raises(ValueError, match=words):
+            import_dataset(settings_for(folder, "reach", out))
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("name", ["../out", "/tmp/out", "", "a//b", "a b"])
+@pytest.mark.parametrize("form", ["lerobot", "hdf5", "rows"])
+def test_names_of_datasets_stay_in_their_folder(tmp_path, form, name):
+    path = recorded(tmp_path, "touch", "still", 1)
+    with pytest.raises(ValueError, match="--name"):
+        find_format(form).export([path], name, tmp_path / "sets", 0)
+    assert not (tmp_path / "sets").exists()
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_seats_that_are_not_there_are_refused(tmp_path, form):
+    path = recorded(tmp_path, "touch", "still", 1)
+    with pytest.raises(ValueError, match="--seat 3"):
+        find_format(form).export([path], "a/touch/x-v0"[2:], tmp_path / "sets", 3)
+    assert not [*tmp_path.rglob(".part*")]
+
+
+def test_folder_that_cannot_be_made_is_named(tmp_path):
+    path = recorded(tmp_path, "touch", "still", 1)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ValueError, match="cannot be made"):
+        find_format("rows").export([path], "x", tmp_path / "file", 0)
+    with pytest.raises(ValueError, match="cannot be made"):
+        relabelled(path, "touch", tmp_path / "file" / "x")
+
+
+def test_source_of_no_known_format_is_named(tmp_path):
+    (tmp_path / "other").mkdir()
+    with pytest.raises(ValueError, match="no LeRobot dataset"):
+        import_dataset(settings_for(tmp_path / "other", "touch", tmp_path / "new"))
+
+
 BAD_ROWS = {
     "column 'y' is missing": "t,x\n0,1\n",
     "'abc' is no number": "t,x,y\n0,1,abc\n",
-    "times grow": "t,x,y\n0,0,0\n",
+    "times do not grow|times grow": "t,x,y\n0,0,0\n",
+    r"0\.5 s follows 1\.0 s": "t,x,y\n0,0,0\n1,0,0\n0.5,0,0\n",
+    "line 3: 1 cells, expected 3": "t,x,y\n0,0,0\n1\n",
+    "row 1: the puck at .* is off the table": "t,x,y\n0,0,0\n1,300,0\n",
     "never seen": "t,x,y\n0,,\n1,,\n",
     "a time is missing": "t,x,y\n,0,0\n1,0,0\n",
 }

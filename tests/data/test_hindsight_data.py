@@ -55,7 +55,7 @@ def test_play_of_another_task_becomes_data_of_a_goal_task(tmp_path):
 
 def test_hindsight_without_goals_is_refused(tmp_path):
     path = recorded(tmp_path, "juggle", "still", 2)
-    with pytest.raises(ValueError, match="no desired goal"):
+    with pytest.raises(ValueError, match="juggle: it has no goals"):
         with_hindsight(path, "juggle", tmp_path / "new")
     path = recorded(tmp_path, "hit_goal", "still", 2, options={"seconds": 0.1})
     with pytest.raises(ValueError, match="no goal of hit_goal was reached"):

@@ -80,4 +80,10 @@ def import_dataset(settings: ImportSettings) -> Path:
         ValueError: It cannot be read, or does not fit the scenario; named.
     """
     source = Path(settings.source)
-    return next(each for each in FORMATS.values() if each.fits(source)).read(settings)
+    fitting = [name for name, each in FORMATS.items() if each.fits(source)]
+    if fitting == ["minari"] and source.exists():
+        raise ValueError(
+            f"{source}: no LeRobot dataset ({INFO}), no HDF5 and no CSV file; a Minari "
+            "dataset is given by its name"
+        )
+    return FORMATS[fitting[0]].read(settings)

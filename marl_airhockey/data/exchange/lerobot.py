@@ -36,7 +36,7 @@ from marl_airhockey.data.exchange.seats import (
     playable,
 )
 from marl_airhockey.data.exchange.settings import ImportSettings
-from marl_airhockey.data.files import shared_head, whole_folder
+from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.parquet import read_table
 from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.make import parallel_env
@@ -47,6 +47,12 @@ STATE = ("position", "velocity", "angle", "spin")
 OBSERVATION, ACTION = "observation.state", "action"
 NEEDED = (OBSERVATION, ACTION, "next.reward", "next.done")
 """Features without which a dataset cannot be learned from"""
+INDICES = ("episode_index", "frame_index")
+OPTIONAL = (
+    *("observation.achieved_goal", "observation.desired_goal"),
+    *("next.success", "next.terminated", "next.truncated"),
+)
+"""Further features that are read where they are; without `next.success`, none is"""
 
 
 def export_lerobot(
@@ -73,12 +79,12 @@ def export_lerobot(
         raise ValueError(
             f"control_dt {head['control_dt']}: LeRobot takes whole frames per second"
         )
-    final = (root or Path("datasets")) / name
+    final = named_folder(root, name)
     with whole_folder(final) as folder:
         writer = LeRobotWriter(folder, round(rate), _names(head, seat))
         for path, episode in episodes_with_steps(files):
             check_seat(episode, seat)
-            frames, last = _frames(episode, seat)
+            frames, last = _frames(path, episode, seat)
             writer.add(frames, last, _task(head), *_film(path, episode))
         ours = {**playable(head), "scenario": head["scenario"], "seat": seat}
         writer.close({**ours, "backend": head["backend"]})
@@ -100,10 +106,10 @@ def _names(head: Mapping[str, Any], seat: int) -> dict[str, list[str]]:
     return names
 
 
-def _frames(episode: RecordedEpisode, seat: int) -> tuple[Columns, Columns]:
+def _frames(path: Path, episode: RecordedEpisode, seat: int) -> tuple[Columns, Columns]:
     """Return the features (T, ...) of an episode, and its last observation."""
     columns, shown = episode.columns, {}
-    for part, values in observations_of(episode).items():
+    for part, values in observations_of(path, episode).items():
         name = OBSERVATION if part in ("", "observation") else f"observation.{part}"
         shown[name] = values[:, seat].astype(np.float32)
     state = [
@@ -162,12 +168,15 @@ def import_lerobot(settings: ImportSettings) -> Path:
         if name not in features:
             raise ValueError(f"{folder}: the feature {name!r} is missing")
     known = _json(folder / OURS) if (folder / OURS).exists() else {}
-    known.setdefault("control_dt", 1.0 / info["fps"])
+    rate = info.get("fps")
+    if not (isinstance(rate, (int, float)) and rate > 0):
+        raise ValueError(f"{folder / INFO}: fps {rate!r} is no rate")
+    known.setdefault("control_dt", 1.0 / rate)
     head = settings.head("lerobot", known)
     parts = _parts(features)
     shapes = [tuple(features[name]["shape"]) for name in (OBSERVATION, ACTION)]
     check_shapes(str(folder), head, None if len(parts) > 1 else shapes[0], shapes[1])
-    last = _last_observations(folder, parts)
+    lengths, last = _episode_rows(folder, parts)
     with whole_recording(settings.out, head) as writer:
         for number, frames in _episodes(folder):
             first, columns = _columns(frames, parts, last.get(number, {}))
@@ -179,6 +188,10 @@ def import_lerobot(settings: ImportSettings) -> Path:
             writer.begin(first, number)
             writer.add_rows(columns)
             writer.end(PLAYED)
+            if lengths.pop(number, None) != len(columns["reward"]):
+                raise ValueError(f"{folder}: episode {number}: frames are missing")
+        if lengths or not writer.episodes:
+            raise ValueError(f"{folder}: episodes are missing: {[*lengths][:5]}")
     return settings.out
 
 
@@ -189,9 +202,12 @@ def _json(file: Path) -> dict[str, Any]:
         ValueError: It cannot be read; names the file.
     """
     try:
-        return dict(json.loads(file.read_text()))
-    except (OSError, ValueError, TypeError) as error:
+        content = json.loads(file.read_text())
+    except (OSError, ValueError) as error:
         raise ValueError(f"{file}: cannot be read: {error}") from error
+    if not isinstance(content, dict):
+        raise ValueError(f"{file}: expected an object, got {type(content).__name__}")
+    return content
 
 
 def _parts(features: Mapping[str, Any]) -> dict[str, str]:
@@ -202,21 +218,28 @@ def _parts(features: Mapping[str, Any]) -> dict[str, str]:
     return {OBSERVATION: "observation"}
 
 
-def _last_observations(
+def _episode_rows(
     folder: Path, parts: Mapping[str, str]
-) -> dict[int, dict[str, Array]]:
-    """Return the observations after the last steps, by episode and feature."""
-    found = {}
+) -> tuple[dict[int, int], dict[int, dict[str, Array]]]:
+    """Return lengths of episodes, and their last observations by feature.
+
+    Raises:
+        ValueError: There is no table of episodes.
+    """
+    lengths, found = {}, {}
+    names = ["episode_index", "length", *(f"{FINAL}{n}" for n in parts)]
     for file in sorted((folder / EPISODES).rglob("*.parquet")):
-        rows = read_table(file, ["episode_index", *(f"{FINAL}{n}" for n in parts)])
-        for row in rows.to_pylist():
+        for row in read_table(file, names).to_pylist():
             number = int(row.pop("episode_index"))
+            lengths[number] = int(row.pop("length"))
             found[number] = {
                 name.removeprefix(FINAL): np.array(value, np.float32)
                 for name, value in row.items()
                 if value is not None
             }
-    return found
+    if not lengths:
+        raise ValueError(f"{folder / EPISODES}: there is no table of episodes in it")
+    return lengths, found
 
 
 def _episodes(folder: Path) -> Iterator[tuple[int, Columns]]:
@@ -230,9 +253,14 @@ def _episodes(folder: Path) -> Iterator[tuple[int, Columns]]:
         raise ValueError(f"{folder / DATA}: there are no files *.parquet in it")
     for file in files:
         table = read_table(file)
+        for name in (*NEEDED, *INDICES):
+            if name not in table.column_names:
+                raise ValueError(f"{file}: the column {name!r} is missing")
         numbers = table["episode_index"].to_numpy()
         columns = {
-            name: np.array(table[name].to_pylist()) for name in table.column_names
+            name: _numbers(file, name, table[name].to_pylist())
+            for name in (*NEEDED, *INDICES, *OPTIONAL)
+            if name in table.column_names
         }
         for number in dict.fromkeys(numbers.tolist()):
             rows = numbers == number
@@ -240,6 +268,18 @@ def _episodes(folder: Path) -> Iterator[tuple[int, Columns]]:
             if (frames["frame_index"] != np.arange(rows.sum())).any():
                 raise ValueError(f"{file}: episode {number}: frames are missing")
             yield int(number), frames
+
+
+def _numbers(file: Path, name: str, values: list[Any]) -> Array:
+    """Return a column as an array.
+
+    Raises:
+        ValueError: It holds no numbers, or lists of different lengths; named.
+    """
+    try:
+        return np.array(values, np.float64)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{file}: column {name!r}: {error}") from error
 
 
 def _columns(

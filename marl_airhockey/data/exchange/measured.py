@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import pathlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,14 @@ from marl_airhockey.core.recording import Columns, Recording
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.state import RESULTS, Kind
 from marl_airhockey.data.columns import SENSED, STATE, scenario_of
+from marl_airhockey.data.exchange.measured_events import Path, fill_events
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.registry import make_scenario
 from marl_airhockey.types import Array
 
+BEYOND = 0.1
+"""Largest distance of a measured body beyond the table's edge, m"""
 BACKEND = "real"
 """Backend of measured recordings: their states are known, and not simulated again"""
 
@@ -57,7 +60,7 @@ def scenario_for(settings: ImportSettings) -> Scenario:
     return scenario
 
 
-def recorded_scenario(path: Path, head: dict[str, Any]) -> Scenario:
+def recorded_scenario(path: pathlib.Path, head: dict[str, Any]) -> Scenario:
     """Return the scenario of a recording that has a puck.
 
     Raises:
@@ -87,7 +90,7 @@ def write_measured(
     """Write a measured episode.
 
     Positions of a puck that was not seen are interpolated, and marked as not visible.
-    Velocities are central differences of the positions.
+    Velocities and contacts follow from the positions, see `measured_events`.
 
     Args:
         writer: Writer of the recording.
@@ -101,9 +104,24 @@ def write_measured(
             never seen.
     """
     rows = len(found.time)
-    if rows < 2 or (np.diff(found.time) <= 0).any():
-        raise ValueError(f"{rows} rows: expected two or more, whose times grow")
+    if rows < 2:
+        raise ValueError(f"{rows} rows: expected two or more")
+    steps = np.diff(found.time)
+    if (steps <= 0).any():
+        k = int(np.argmax(steps <= 0))
+        raise ValueError(
+            f"times must grow, and {found.time[k + 1]} s follows {found.time[k]} s"
+        )
     puck, seen = _puck(scenario, found)
+    half = scenario.scene.table.size / 2 + BEYOND
+    for name, position in (("puck", puck), ("paddle", found.paddle)):
+        if (np.abs(position) > half).any():
+            row = int(np.argmax((np.abs(position) > half).any(1)))
+            raise ValueError(
+                f"row {row}: the {name} at {position[row].round(3).tolist()} m is off "
+                f"the table {scenario.table!r}: --option table=..., metres, its centre "
+                "as origin"
+            )
     columns = _state_columns(scenario, found, puck, seen)
     action = found.action
     if action is None:
@@ -158,14 +176,16 @@ def _state_columns(
 ) -> Columns:
     """Return the columns (T + 1, ...) of states and of what was seen."""
     rows, time = len(found.time), found.time - found.time[0]
-    still = scenario.scene.still_state(rows)
-    state = {name: np.array(getattr(still, name)) for name in RESULTS}
+    states = scenario.scene.still_state(rows)
     moving = found.paddle_velocity
     if moving is None:
         moving = np.gradient(found.paddle, time, axis=0)
-    state["position"][:] = np.stack([found.paddle, puck], 1)
-    state["velocity"][:] = np.stack([moving, np.gradient(puck, time, axis=0)], 1)
-    state["time"][:] = time
+    states.position[:] = np.stack([found.paddle, puck], 1)
+    states.velocity[:, 0], states.time[:] = moving, time
+    if seen.sum() > 1:
+        sighted = Path(time[seen], puck[seen])
+        fill_events(states, scenario.scene, sighted, Path(time, found.paddle))
+    state = {name: np.array(getattr(states, name)) for name in RESULTS}
     last = np.maximum.accumulate(np.where(seen, time, -np.inf))
     age = np.where(np.isfinite(last), time - last, 0.0)
     return {

@@ -42,7 +42,7 @@ from marl_airhockey.types import Array
 if TYPE_CHECKING:
     from minari.data_collector import EpisodeBuffer
 
-NAME = re.compile(r"^([-\w]+/)*[-\w]+-v\d+$")
+NAME = re.compile(r"^(\w[-\w]*\w/)*[-\w]+-v\d+$")
 """Form of a dataset's name, as airhockey/juggle/expert-v0"""
 STATE = ("position", "velocity", "angle", "spin")
 """Fields of the true state that are kept in the infos"""
@@ -74,12 +74,15 @@ def export_minari(
     if not NAME.match(name):
         raise ValueError(f"--name {name!r}: expected it as in airhockey/juggle/test-v0")
     root = root or Path(os.environ.get(ROOT, Path.home() / ".minari" / "datasets"))
+    root = root.resolve()  # Minari would look for a relative one in itself.
     final = root / name
     if final.exists():
         raise ValueError(f"{final}: there is such a dataset; take a new version")
     head = shared_head(files)
-    episodes = (episode for _, episode in episodes_with_steps(files))
-    buffers = [_buffer(k, episode, seat) for k, episode in enumerate(episodes)]
+    buffers = [
+        _buffer(k, path, episode, seat)
+        for k, (path, episode) in enumerate(episodes_with_steps(files))
+    ]
     root.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=root, prefix=".part-") as part:
         with _at(Path(part)):
@@ -158,16 +161,15 @@ def _env_spec(head: Mapping[str, Any], seat: int | None) -> Any:
     return gymnasium.make(spec, **playable(head)).unwrapped.spec
 
 
-def _buffer(number: int, episode: RecordedEpisode, seat: int | None) -> EpisodeBuffer:
+def _buffer(
+    number: int, path: Path, episode: RecordedEpisode, seat: int | None
+) -> EpisodeBuffer:
     """Return an episode as Minari takes it."""
     from minari.data_collector import EpisodeBuffer
 
     columns = episode.columns
-    shown, acts, rewards = (
-        observations_of(episode),
-        columns["action"],
-        columns["reward"],
-    )
+    shown, acts = observations_of(path, episode), columns["action"]
+    rewards = columns["reward"]
     ended, truncated = cut_off(episode)
     if seat is None:
         by_agent = [f"paddle_{k}" for k in range(acts.shape[1])]
@@ -230,8 +232,14 @@ def import_minari(settings: ImportSettings) -> Path:
     with _at(root) if root else contextlib.nullcontext():
         try:
             dataset = minari.load_dataset(name)
-        except (FileNotFoundError, ValueError) as error:
+        except FileNotFoundError as error:
             raise ValueError(f"{name}: there is no such Minari dataset") from error
+        except (OSError, ValueError, KeyError) as error:
+            raise ValueError(f"{name}: Minari cannot read it: {error}") from error
+        if "paddle_0" in getattr(dataset.observation_space, "spaces", {}):
+            raise ValueError(
+                f"{name}: it has several agents; export one of them with --seat"
+            )
         spec = dataset.env_spec
         head = settings.head("minari", dict(spec.kwargs) if spec is not None else {})
         shapes = dataset.observation_space.shape, dataset.action_space.shape

@@ -22,9 +22,13 @@ from marl_airhockey.data.exchange.measured import (
     scenario_for,
     write_measured,
 )
-from marl_airhockey.data.exchange.seats import check_seat, episodes_with_steps
+from marl_airhockey.data.exchange.seats import (
+    all_rows,
+    check_seat,
+    episodes_with_steps,
+)
 from marl_airhockey.data.exchange.settings import ImportSettings
-from marl_airhockey.data.files import shared_head, whole_folder
+from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.types import Array
 
@@ -51,7 +55,7 @@ def import_rows(settings: ImportSettings) -> Path:
         raise ValueError(f"{path}: there are no files *.csv in it")
     tables = [(file, read_rows(file)) for file in files]
     steps = np.concatenate([np.diff(rows[:, 0]) for _, rows in tables])
-    control_dt = float(np.median(steps)) if len(steps) else 0.0
+    control_dt = round(float(np.median(steps)), 6) if len(steps) else 0.0
     if not control_dt > 0:
         raise ValueError(f"{files[0]}: expected two rows or more, whose times grow")
     seat = scenario.scene.seats[0]
@@ -80,25 +84,32 @@ def read_rows(file: Path) -> Array:
     """
     try:
         with file.open(newline="") as opened:
-            reader = csv.DictReader(opened, skipinitialspace=True)
-            header = [name.strip() for name in reader.fieldnames or ()]
-            reader.fieldnames = header
+            reader = csv.reader(opened, skipinitialspace=True)
+            header = [name.strip() for name in next(reader, ())]
             missing = [name for name in PUCK if name not in header]
             if missing:
                 raise ValueError(
                     f"{file}: column {missing[0]!r} is missing; the first line must be "
                     "t,x,y, optionally with paddle_x,paddle_y"
                 )
-            rows = [
-                [_number(file, reader.line_num, row.get(n)) for n in (*PUCK, *PADDLE)]
-                for row in reader
-            ]
+            rows = [_row(file, reader.line_num, header, cells) for cells in reader]
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: cannot be read: {error}") from error
     found = np.array(rows).reshape(-1, 5)
     if not np.isfinite(found[:, 0]).all():
         raise ValueError(f"{file}: a time is missing")
     return found
+
+
+def _row(file: Path, line: int, header: list[str], cells: list[str]) -> list[float]:
+    """Return the numbers (5,) of a row; nan in columns that are not there."""
+    if len(cells) != len(header):
+        raise ValueError(
+            f"{file}, line {line}: {len(cells)} cells, expected {len(header)}; leave "
+            "those of an unseen body empty"
+        )
+    row = dict(zip(header, cells, strict=True))
+    return [_number(file, line, row.get(name)) for name in (*PUCK, *PADDLE)]
 
 
 def _number(file: Path, line: int, cell: str | None) -> float:
@@ -122,7 +133,7 @@ def export_rows(
     if seat is None:
         raise ValueError("--seat: the rows have one paddle; name its seat")
     recorded_scenario(files[0], shared_head(files))
-    final = (root or Path("datasets")) / name
+    final = named_folder(root, name)
     with whole_folder(final) as folder:
         for k, (_, episode) in enumerate(episodes_with_steps(files)):
             check_seat(episode, seat)
@@ -137,7 +148,7 @@ def _write(file: Path, episode: RecordedEpisode, seat: int) -> None:
     measured = SEEN in known
     if measured:
         names += [SEEN, f"{SENSED}visible"]
-    parts = [np.concatenate([episode.first[n][None], known[n]]) for n in names]
+    parts = [all_rows(episode, name) for name in names]
     pucks = known["action"].shape[1]
     paddle, puck = parts[1][:, seat].copy(), parts[1][:, pucks].copy()
     if measured:

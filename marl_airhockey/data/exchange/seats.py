@@ -38,7 +38,7 @@ def episodes_with_steps(
         raise ValueError(f"{files[0]}: there are no steps in it")
 
 
-def observations_of(episode: RecordedEpisode) -> dict[str, Array]:
+def observations_of(path: Path, episode: RecordedEpisode) -> dict[str, Array]:
     """Return the observations (T + 1, seats, D) by part; of flat ones, the part is "".
 
     Raises:
@@ -46,13 +46,21 @@ def observations_of(episode: RecordedEpisode) -> dict[str, Array]:
     """
     names = [n for n in episode.first if n.split(".")[0] == OBSERVATION]
     if not names:
-        raise ValueError("there are no observations in it")
-    return {
-        name.partition(".")[2]: np.concatenate(
-            [episode.first[name][None], episode.columns[name]]
+        raise ValueError(
+            f"{path}: there are no observations in it; airhockey data relabel adds them"
         )
-        for name in names
-    }
+    return {name.partition(".")[2]: all_rows(episode, name) for name in names}
+
+
+def all_rows(episode: RecordedEpisode, name: str) -> Array:
+    """Return a column (T + 1, ...) with its value before the first step.
+
+    Raises:
+        ValueError: It was not recorded.
+    """
+    if name not in episode.first or name not in episode.columns:
+        raise ValueError(f"episode {episode.index}: {name} was not recorded")
+    return np.concatenate([episode.first[name][None], episode.columns[name]])
 
 
 def check_seat(episode: RecordedEpisode, seat: int) -> None:

@@ -2,10 +2,10 @@
 
 A file `trajectory_data{i}.hdf5` has `train_vals` (T, 35): time, trajectory, step,
 emergency stop, safety, pose, speed, force, acceleration, target pose, puck. Older files
-have no puck (32), and no safety either (31). Poses are of the tool in the robot's base
-frame, whose x axis points from the table to the robot and past it. The puck is in the
-authors' table frame, whose x is that of the robot plus `OFFSET`; its third number is 1
-where it was not seen. Pictures, `train_img`, stay in the file.
+have no puck (32), and no safety either (31, or 32 with a column more). Poses are of the
+tool in the robot's base frame, whose x axis points from the table to the robot and past
+it. The puck is in the authors' table frame, whose x is that of the robot plus `OFFSET`;
+its third number is 1 where it was not seen. Pictures, `train_img`, stay in the file.
 """
 
 from __future__ import annotations
@@ -27,9 +27,14 @@ from marl_airhockey.data.exchange.measured import (
     scenario_for,
     write_measured,
 )
-from marl_airhockey.data.exchange.seats import check_seat, episodes_with_steps
+from marl_airhockey.data.exchange.seats import (
+    agent_at,
+    all_rows,
+    check_seat,
+    episodes_with_steps,
+)
 from marl_airhockey.data.exchange.settings import ImportSettings
-from marl_airhockey.data.files import shared_head, whole_folder
+from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.types import Array
 
@@ -47,8 +52,26 @@ FIELDS = {
     "puck": 3,
 }
 """Number of columns of each field of `train_vals`"""
-LAYOUTS = {35: (), 32: ("puck",), 31: ("safe", "puck")}
-"""Fields that are missing, by the number of columns"""
+TAIL = "tail"
+"""Field of the last ten columns of files of 32 columns without safety"""
+ALL = tuple(FIELDS)
+LAYOUTS: dict[int, tuple[str, ...]] = {
+    35: ALL,
+    32: ALL[:-1],
+    31: tuple(name for name in ALL[:-1] if name != "safe"),
+}
+"""Fields in the order of their columns, by the number of columns"""
+OLDEST = (
+    "time",
+    "trajectory",
+    "step",
+    "emergency_stop",
+    "pose",
+    "speed",
+    "force",
+    TAIL,
+)
+"""Fields of files of 32 columns without safety"""
 ROBOT = "robot."
 """Beginning of the names of columns that hold the fields as they are in the file"""
 OFFSET = 1.2
@@ -136,8 +159,10 @@ def _read(file: Path) -> Columns:
     if not np.isfinite(values).all():
         row = int(np.flatnonzero(~np.isfinite(values).all(1))[0])
         raise ValueError(f"{file}: row {row} is not finite")
-    names = [name for name in FIELDS if name not in LAYOUTS[columns]]
-    ends = np.cumsum([FIELDS[name] for name in names])[:-1]
+    names = LAYOUTS[columns]
+    if columns == 32 and not np.isin(values[:, 4], (0.0, 1.0)).all():
+        names = OLDEST  # What stands where safety would be is a coordinate.
+    ends = np.cumsum([FIELDS.get(name, 10) for name in names])[:-1]
     return dict(zip(names, np.split(values, ends, axis=1), strict=True))
 
 
@@ -162,8 +187,17 @@ def _puck(file: Path, values: Array) -> Array:
 
 def _actions(fields: Columns) -> Array:
     """Return the actions (T - 1, 2) as the authors scale them, our table frame."""
-    gap = fields["target_pose"][:-1, :2] - fields["pose"][:-1, :2]
+    gap = _target(fields)[:-1, :2] - fields["pose"][:-1, :2]
     return np.asarray(np.clip(-gap / FULL, -1.0, 1.0))
+
+
+def _target(fields: Columns) -> Array:
+    """Return the target poses (T, 6): in a tail, the columns most like the poses."""
+    if TAIL not in fields:
+        return fields["target_pose"]
+    tail, pose = fields[TAIL], fields["pose"]
+    places = [tail[:, at : at + 6] for at in range(5)]
+    return min(places, key=lambda each: float(np.abs(each - pose).mean()))
 
 
 def _ego(scenario: Scenario, seat: int) -> Array:
@@ -189,9 +223,11 @@ def export_trajectories(
 
     if seat is None:
         raise ValueError("--seat: a trajectory is that of one paddle; name it")
-    head, final = shared_head(files), (root or Path("datasets")) / name
+    head, final = shared_head(files), named_folder(root, name)
     with whole_folder(final) as folder:
-        rotation = _ego(recorded_scenario(files[0], head), seat)
+        scenario = recorded_scenario(files[0], head)
+        agent_at([f"paddle_{k}" for k in range(len(scenario.scene.seats))], seat)
+        rotation = _ego(scenario, seat)
         for k, (_, episode) in enumerate(episodes_with_steps(files)):
             check_seat(episode, seat)
             fields = _kept_fields(episode) or _fields(k, episode, seat, rotation)
@@ -204,16 +240,16 @@ def export_trajectories(
 
 def _kept_fields(episode: RecordedEpisode) -> Columns:
     """Return the fields (T + 1, n) of the file that an episode comes from, if any."""
-    names = [name for name in FIELDS if ROBOT + name in episode.columns]
-    return {name: _all_rows(episode, ROBOT + name) for name in names}
+    names = [n for n in (*FIELDS, TAIL) if ROBOT + n in episode.columns]
+    return {name: all_rows(episode, ROBOT + name) for name in names}
 
 
 def _fields(
     number: int, episode: RecordedEpisode, seat: int, rotation: Array
 ) -> Columns:
     """Return the fields (T + 1, n) made of the states of an episode."""
-    position = _all_rows(episode, "state.position")
-    velocity = _all_rows(episode, "state.velocity")
+    position = all_rows(episode, "state.position")
+    velocity = all_rows(episode, "state.velocity")
     action = np.concatenate([episode.columns["action"][:, seat], np.zeros((1, 2))])
     seats = episode.columns["action"].shape[1]
     rows = len(position)
@@ -222,7 +258,7 @@ def _fields(
     flat = -position[:, seat] - (OFFSET, 0.0)
     target = flat - FULL * (action @ rotation)
     return {
-        "time": _all_rows(episode, "state.time")[:, None],
+        "time": all_rows(episode, "state.time")[:, None],
         "trajectory": number * one,
         "step": np.arange(rows)[:, None] * one,
         "emergency_stop": zero,
@@ -234,14 +270,3 @@ def _fields(
         "target_pose": np.hstack([target, upright]),
         "puck": np.hstack([-position[:, seats], zero]),
     }
-
-
-def _all_rows(episode: RecordedEpisode, name: str) -> Array:
-    """Return a column (T + 1, ...) with its value before the first step.
-
-    Raises:
-        ValueError: It was not recorded.
-    """
-    if name not in episode.columns:
-        raise ValueError(f"episode {episode.index}: {name} was not recorded")
-    return np.concatenate([episode.first[name][None], episode.columns[name]])

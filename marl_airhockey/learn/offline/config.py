@@ -101,11 +101,13 @@ def offline_config(
             raise ValueError(
                 f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r}"
             )
-    seat = changes.get("seat", 0)
+    seat, players = changes.get("seat", 0), head["players"]
+    if not 0 <= seat < len(players):
+        raise ValueError(f"seat: there is no seat {seat} in {files[0]}")
+    # Evaluated policies play paddle_0, so who played there takes the learned seat.
     drivers = {
-        f"paddle_{i}": player["driver"]
-        for i, player in enumerate(head["players"])
-        if i != seat
+        f"paddle_{i}": players[0 if i == seat else i]["driver"]
+        for i in range(1, len(players))
     }
     settings = {
         "scenario": head["scenario"],

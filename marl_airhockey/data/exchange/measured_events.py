@@ -1,0 +1,68 @@
+"""Velocities and contacts of a puck, from its measured positions alone."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.backends.real.events import Track, find_contacts
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.state import State
+from marl_airhockey.types import Array
+
+
+class Path(NamedTuple):
+    """Path of a body at T + 1 times, table frame."""
+
+    time: Array
+    """(T + 1,) s"""
+    position: Array
+    """(T + 1, 2) m"""
+
+
+def fill_events(state: State, scene: Scene, puck: Path, paddle: Path) -> None:
+    """Fill contacts, bounces and goal lines of one puck, and its velocity.
+
+    Velocities are central differences of the positions, and one-sided ones next to a
+    contact or a bounce.
+
+    Args:
+        state: States (T + 1, ...) of one paddle and one puck, changed in place.
+        scene: Table, sizes and goal lines.
+        puck: Times and positions at which the puck was seen.
+        paddle: All T + 1 times and positions of the paddle.
+    """
+    rows = np.searchsorted(paddle.time, puck.time)
+    before, after = _one_sided(puck)
+    central = np.gradient(puck.position, puck.time, axis=0)
+    touching = False
+    for k, (a, b) in enumerate(pairwise(rows)):
+        first = Track(float(puck.time[k]), puck.position[k], before[k])
+        last = Track(float(puck.time[k + 1]), puck.position[k + 1], after[k + 1])
+        way = slice(a, b + 1)
+        met = find_contacts(scene, first, last, paddle.time[way], paddle.position[way])
+        touches = bool(np.isfinite(met.paddle_at))
+        if touches and not touching:
+            state.touched[b, 0, 0] = 1
+            state.touched_at[b, 0, 0] = met.paddle_at - paddle.time[b - 1]
+        touching = touches
+        state.touching[b, 0, 0] = touches
+        state.banked[b, 0] += met.banks
+        for line, goal in enumerate(scene.goal_lines):
+            if goal.width is None and met.banks[goal.side]:
+                state.crossed[b, 0, line] = True
+                state.crossed_velocity[b, 0, line] = met.velocity
+        if touches or met.banks.any():
+            central[k], central[k + 1] = before[k], after[k + 1]
+    for axis in range(2):
+        state.velocity[:, 1, axis] = np.interp(paddle.time, puck.time, central[:, axis])
+
+
+def _one_sided(path: Path) -> tuple[Array, Array]:
+    """Return the velocities (T, 2) from the time before, and to the time after."""
+    if len(path.time) < 2:
+        return np.zeros_like(path.position), np.zeros_like(path.position)
+    steps = np.diff(path.position, axis=0) / np.diff(path.time)[:, None]
+    return np.concatenate([steps[:1], steps]), np.concatenate([steps, steps[-1:]])
