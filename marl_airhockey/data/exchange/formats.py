@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.data.exchange.lerobot import export_lerobot, import_lerobot
+from marl_airhockey.data.exchange.lerobot import export_lerobot
+from marl_airhockey.data.exchange.lerobot_reader import import_lerobot
 from marl_airhockey.data.exchange.lerobot_writer import INFO
 from marl_airhockey.data.exchange.minari import export_minari, import_minari
 from marl_airhockey.data.exchange.rows import export_rows, import_rows
