@@ -155,18 +155,37 @@ def check(
     paths: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders of them.")
     ],
+    replay: Annotated[
+        bool,
+        typer.Option(
+            "--replay",
+            help="Compute rewards, success and observations again, and compare them.",
+        ),
+    ] = False,
 ) -> None:
     """Read all of recordings and name what is wrong; exit 1 if anything is."""
     from marl_airhockey.data.files import recordings_in
     from marl_airhockey.data.reader import episodes_of
+    from marl_airhockey.data.verify import EXACT, replay_differences
 
     count = 0
     wrong: list[str] = []
     for path in recordings_in(paths):
         try:
             count += sum(1 for _ in episodes_of(path, bad=wrong))
+            found = replay_differences(path) if replay else {}
         except ValueError as error:
             wrong.append(str(error))
+            continue
+        wrong += [
+            f"{path}: {name} differs by {off:.3g} from what its states give today"
+            for name, off in sorted(found.items())
+            if off > EXACT
+        ]
+        if replay:
+            largest = max(found.values(), default=0.0)
+            words = f"{path}: replayed, largest difference {largest:.1e}"
+            console.print(words, soft_wrap=True, markup=False)
     for words in wrong:
         console.print(words, soft_wrap=True, markup=False)
     console.print(f"{count} good episodes, {len(wrong)} faults")

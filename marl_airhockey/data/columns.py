@@ -92,6 +92,8 @@ def first_columns(world: World) -> Columns:
         sensed = world.sensed
         columns |= {SENSED + name: getattr(sensed, name) for name in SEEN}
         columns[f"{SENSED}age"] = world.sensor.age
+    if world.backend.senses_itself:
+        columns[f"{SENSED}visible"] = state.visible
     columns |= {MEMORY + name: value for name, value in world.memory.items()}
     if world.observer.observe == "pixels":
         return columns

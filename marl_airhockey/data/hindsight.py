@@ -13,7 +13,6 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.core.recording import PLAYED, Columns, Recording
-from marl_airhockey.data.columns import first_columns, step_columns
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches, new_head
 from marl_airhockey.data.replay import Replay
@@ -58,8 +57,10 @@ def with_hindsight(
     with whole_recording(out, {**new, "hindsight": copies}) as writer:
         for batch in batches(episodes_of(path)):
             replay = Replay(Recording(path, head, batch), game)
-            for first, columns, number in _replayed(replay):
-                episode = batch[number]
+            before, after = replay.run(_kept)
+            for i, episode in enumerate(batch):
+                first = {name: value[i] for name, value in before.items()}
+                columns = {n: v[i, : len(episode)] for n, v in after.items()}
                 given = episode.seed, episode.number, episode.physics
                 for _ in range(copies):
                     found = _copy(game, first, columns, rng)
@@ -73,24 +74,6 @@ def with_hindsight(
 def has_goals(scenario: str) -> bool:
     """Return whether a scenario has goals."""
     return isinstance(make_scenario(scenario), GoalScenario)
-
-
-def _replayed(replay: Replay) -> list[tuple[Columns, Columns, int]]:
-    """Return the columns before and after the steps of each episode, and its index."""
-    replay.begin()
-    first, rows = first_columns(replay.world), []
-    for t in range(int(replay.lengths.max())):
-        replay.step(t)
-        rows.append(step_columns(replay.world))
-    whole = {n: np.stack([row[n] for row in rows], 1) for n in rows[0] if _kept(n)}
-    return [
-        (
-            {name: value[i] for name, value in first.items() if _kept(name)},
-            {name: value[i, :length] for name, value in whole.items()},
-            i,
-        )
-        for i, length in enumerate(replay.lengths)
-    ]
 
 
 def _kept(name: str) -> bool:

@@ -8,7 +8,7 @@ against the rules of today.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -17,11 +17,19 @@ import numpy as np
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.recording import RecordedEpisode, Recording
+from marl_airhockey.core.recording import Columns, RecordedEpisode, Recording
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import RESULTS, State
-from marl_airhockey.data.columns import JUDGED, PATH, STATE, scenario_of, states_of
+from marl_airhockey.data.columns import (
+    JUDGED,
+    PATH,
+    STATE,
+    first_columns,
+    scenario_of,
+    states_of,
+    step_columns,
+)
 from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
@@ -136,6 +144,27 @@ class Replay:
     def step(self, t: int) -> StepResult:
         """Make step t (from 0); episodes that have ended keep their last state."""
         return self.world.step(self._actions[t])
+
+    def run(
+        self, keep: Callable[[str], bool] = lambda name: True
+    ) -> tuple[Columns, Columns]:
+        """Replay all episodes and return their columns.
+
+        Args:
+            keep: Function that says which columns are returned, by name.
+
+        Returns:
+            Columns (B, ...) before the first step, and (B, T, ...) after each; those
+            after an episode's end repeat its last state.
+        """
+        self.begin()
+        first = {n: v for n, v in first_columns(self.world).items() if keep(n)}
+        rows = []
+        for t in range(int(self.lengths.max())):
+            self.step(t)
+            columns = step_columns(self.world)
+            rows.append({n: np.array(v) for n, v in columns.items() if keep(n)})
+        return first, {n: np.stack([row[n] for row in rows], 1) for n in rows[0]}
 
 
 def judged_states(episode: RecordedEpisode, states: State, scenario: Scenario) -> State:

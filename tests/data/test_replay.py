@@ -1,19 +1,20 @@
 """Replayed recordings: what follows from recorded states is what was recorded."""
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
 import marl_airhockey as ah
 from marl_airhockey.cli.main import app
 from marl_airhockey.core.recording import Recording
-from marl_airhockey.data.columns import step_columns
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import fitting, relabelled
 from marl_airhockey.data.replay import Replay
-
-EXACT = 1e-9
+from marl_airhockey.data.verify import EXACT, distance, replay_differences
 
 
 def recorded(path, scenario, episodes=3, **keywords):
@@ -26,33 +27,10 @@ def recorded(path, scenario, episodes=3, **keywords):
     return read_recording(path)
 
 
-def distance(one, other):
-    """Largest difference of two arrays; infinite where only one is finite."""
-    one, other = (np.asarray(x, np.float64) for x in (one, other))
-    same = (one == other) | (np.isnan(one) & np.isnan(other))
-    with np.errstate(invalid="ignore"):
-        off = np.where(same, 0.0, np.abs(one - other))
-    return float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))
-
-
-def differences(recording, replay):
-    """Largest difference of each column from the recorded one."""
-    found = {}
-    replay.begin()
-    for t in range(int(replay.lengths.max())):
-        replay.step(t)
-        for name, values in step_columns(replay.world).items():
-            for row, episode in enumerate(recording.episodes):
-                if t < len(episode):
-                    off = distance(values[row], episode.columns[name][t])
-                    found[name] = max(found.get(name, 0.0), off)
-    return found
-
-
 @pytest.mark.parametrize("profile", ["ideal", "ur5e"])
 def test_it_computes_what_was_recorded(scenario, profile, tmp_path):
     recording = recorded(tmp_path / "r", scenario, profile=profile)
-    found = differences(recording, Replay(recording))
+    found = replay_differences(recording.path)
     columns = set(recording.episodes[0].columns)
     assert set(found) == columns
     assert {n: d for n, d in found.items() if not d <= EXACT} == {}
@@ -61,14 +39,14 @@ def test_it_computes_what_was_recorded(scenario, profile, tmp_path):
 @pytest.mark.parametrize("observe", ["history", "estimate"])
 def test_observations_of_a_sensor_are_those_of_the_recording(observe, tmp_path):
     recording = recorded(tmp_path / "r", "juggle", profile="ur5e", observe=observe)
-    found = differences(recording, Replay(recording))
+    found = replay_differences(recording.path)
     assert found["observation"] <= EXACT
     assert found["sensed.position"] <= EXACT
 
 
 def test_a_pymunk_recording_is_judged_by_the_same_rules(tmp_path):
     recording = recorded(tmp_path / "r", "duel", backend="pymunk")
-    assert max(differences(recording, Replay(recording)).values()) <= EXACT
+    assert max(replay_differences(recording.path).values()) <= EXACT
 
 
 def test_another_task_judges_the_recorded_states(tmp_path):
@@ -98,7 +76,11 @@ def test_tasks_that_the_recording_cannot_serve_are_refused(task, words, tmp_path
 def test_episodes_are_replayed_alone_as_together(tmp_path):
     recording = recorded(tmp_path / "r", "juggle", profile="ur5e")
     alone = Recording(recording.path, recording.head, recording.episodes[2:])
-    assert max(differences(alone, Replay(alone)).values()) <= EXACT
+    _, one = Replay(alone).run()
+    _, all_three = Replay(recording).run()
+    steps = len(recording.episodes[2])
+    for name, values in one.items():
+        assert distance(values[0], all_three[name][2, :steps]) <= EXACT, name
 
 
 def test_relabelled_play_ends_by_the_new_rules(tmp_path):
@@ -132,3 +114,20 @@ def test_all_tasks_that_fit_are_relabelled_in_one_command(tmp_path):
     command = ["data", "relabel", str(tmp_path / "juggle"), "--out", str(out)]
     assert CliRunner().invoke(app, command).exit_code == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(found)
+
+
+def test_check_compares_a_recording_with_its_replay(tmp_path):
+    recorded(tmp_path / "r", "juggle")
+    done = CliRunner().invoke(app, ["data", "check", "--replay", str(tmp_path / "r")])
+    assert done.exit_code == 0, done.output
+    assert "replayed, largest difference" in done.output
+    part = next((tmp_path / "r" / "steps").iterdir())
+    table = pq.ParquetFile(part).read()
+    column = table.column_names.index("reward")
+    changed = pa.FixedSizeListArray.from_arrays(
+        pc.add(table["reward"].combine_chunks().flatten(), 0.5), 1
+    )
+    pq.write_table(table.set_column(column, "reward", changed), part)
+    done = CliRunner().invoke(app, ["data", "check", "--replay", str(tmp_path / "r")])
+    assert done.exit_code == 1
+    assert "reward differs by 0.5 from what its states" in " ".join(done.output.split())

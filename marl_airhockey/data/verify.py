@@ -1,0 +1,56 @@
+"""Verification of recordings: do the rules of today make of them what was recorded?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from marl_airhockey.core.recording import Columns, Recording
+from marl_airhockey.data.columns import SENSED
+from marl_airhockey.data.reader import episodes_of, read_head
+from marl_airhockey.data.relabel import batches
+from marl_airhockey.data.replay import Replay
+from marl_airhockey.types import Array
+
+MEASURED = ("device.", "robot.", "frame", "clock", "round_trip", f"{SENSED}visible")
+"""Beginnings of columns that are measured, and do not follow from states"""
+EXACT = 1e-9
+"""Largest difference that rounding explains"""
+
+
+def replay_differences(path: Path) -> dict[str, float]:
+    """Return the largest difference of each column from what a replay computes.
+
+    Columns that only one of both has differ by infinity, but for measured ones.
+
+    Raises:
+        ValueError: The recording cannot be replayed; named.
+    """
+    head, found = read_head(path), dict[str, float]()
+    for batch in batches(episodes_of(path)):
+        _, columns = Replay(Recording(path, head, batch)).run()
+        for i, episode in enumerate(batch):
+            own = {name: value[i, : len(episode)] for name, value in columns.items()}
+            for name, off in _differences(own, episode.columns).items():
+                found[name] = max(found.get(name, 0.0), off)
+    return found
+
+
+def _differences(one: Columns, other: Columns) -> dict[str, float]:
+    return {
+        name: distance(one[name], other[name])
+        if name in one and name in other
+        else np.inf
+        for name in one.keys() | other.keys()
+        if name in one or not name.startswith(MEASURED)
+    }
+
+
+def distance(one: Array, other: Array) -> float:
+    """Return the largest difference; infinite where only one is finite."""
+    one, other = (np.asarray(x, np.float64) for x in (one, other))
+    same = (one == other) | (np.isnan(one) & np.isnan(other))
+    with np.errstate(invalid="ignore"):
+        off = np.where(same, 0.0, np.abs(one - other))
+    return float(np.where(np.isnan(off), np.inf, off).max(initial=0.0))

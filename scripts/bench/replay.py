@@ -1,0 +1,54 @@
+"""Replay 1,000 recorded episodes of every scenario and compare what it computes.
+
+    python scripts/bench/replay.py --episodes 1000
+
+Printed are the steps of each scenario and the largest difference of any column: states,
+memory, observations, reward terms, success, ends. Scripts play at all seats, for 160
+steps at most.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import marl_airhockey as ah
+from marl_airhockey.data.record import record_episodes
+from marl_airhockey.data.summary import summarize_recording
+from marl_airhockey.data.verify import replay_differences
+from marl_airhockey.world.build import Keywords
+
+
+def replayed(name: str, profile: str, episodes: int, folder: Path) -> str:
+    """Record and replay a scenario; return a row of the table."""
+    seats = len(ah.make_scenario(name).scene.seats)
+    driver = "reacher" if name.startswith("reach") else "striker"
+    drivers = {f"paddle_{i}": "striker" for i in range(1, seats)}
+    keywords: Keywords = {"max_cycles": 160, "drivers": drivers, "profile": profile}
+    path = folder / f"{name}-{profile}"
+    began = time.process_time()
+    record_episodes(ah.make_agent(driver), driver, name, episodes, path, 7, keywords)
+    largest = max(replay_differences(path).values())
+    steps, spent = summarize_recording(path).steps, time.process_time() - began
+    return f"| {name} | {profile} | {steps} | {largest:.1e} | {spent:.0f} |"
+
+
+def main(
+    episodes: Annotated[int, typer.Option(help="Episodes of each scenario.")] = 1000,
+    profiles: Annotated[str, typer.Option(help="Comma-separated.")] = "ideal",
+) -> None:
+    """Print the table."""
+    print("| scenario | profile | steps | largest difference | CPU time, s |")
+    print("| --- | --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as folder:
+        for profile in profiles.split(","):
+            for name in ah.scenario_names():
+                print(replayed(name, profile, episodes, Path(folder)), flush=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)
