@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.core.recording import Columns, Recording
-from marl_airhockey.data.columns import SENSED
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches
 from marl_airhockey.data.replay import Replay
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
 
-MEASURED = ("device.", "robot.", "frame", "clock", "round_trip", f"{SENSED}visible")
-"""Beginnings of columns that are measured, and do not follow from states"""
+MEASURED = ("clock", "round_trip")
+"""Columns of play on a page that do not follow from states"""
 EXACT = 1e-9
 """Largest difference that rounding explains"""
 
@@ -28,6 +28,11 @@ def replay_differences(path: Path) -> dict[str, float]:
         ValueError: The recording cannot be replayed; named.
     """
     head, found = read_head(path), dict[str, float]()
+    if find_backend(head.get("backend", DEFAULT_BACKEND)).senses_itself:
+        raise ValueError(
+            f"{path}: measured on a real table, where commands and observations do not "
+            "follow from the states alone; leave out --replay"
+        )
     for batch in batches(episodes_of(path)):
         _, columns = Replay(Recording(path, head, batch)).run()
         for i, episode in enumerate(batch):
@@ -43,7 +48,7 @@ def _differences(one: Columns, other: Columns) -> dict[str, float]:
         if name in one and name in other
         else np.inf
         for name in one.keys() | other.keys()
-        if name in one or not name.startswith(MEASURED)
+        if name not in MEASURED
     }
 
 

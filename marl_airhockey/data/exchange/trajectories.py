@@ -161,7 +161,7 @@ def _read(file: Path) -> Columns:
         raise ValueError(f"{file}: row {row} is not finite")
     names = LAYOUTS[columns]
     if columns == 32 and not np.isin(values[:, 4], (0.0, 1.0)).all():
-        names = OLDEST  # What stands where safety would be is a coordinate.
+        names = OLDEST  # The column of safety holds a coordinate.
     ends = np.cumsum([FIELDS.get(name, 10) for name in names])[:-1]
     return dict(zip(names, np.split(values, ends, axis=1), strict=True))
 
