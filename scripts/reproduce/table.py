@@ -9,7 +9,7 @@ gradient. A cell that ends adds a row to ``docs/data/offline.csv``; one whose ro
 there is not trained again, so the script can be stopped and started.
 
 * 2d: data are ``airhockey/TASK/expert-v0``, or of another tier; 500 episodes on numba.
-* robosuite: data are 20,000 steps of the zoo's policy on robosuite; 50 episodes there.
+* robosuite: data are of the zoo's policy on robosuite; 50 episodes there.
 * lab: data are of ``zoo/TASK_full_size`` in the profile ur5e; 20 episodes through the
   camera and the arm of the virtual lab.
 
@@ -107,7 +107,7 @@ DOMAINS = {
         lambda task, tier, folder: _recorded(
             f"zoo/{task}",
             task,
-            20_000,
+            100_000,
             folder / f"robosuite-{task}",
             {"backend": "robosuite"},
         ),
