@@ -14,7 +14,7 @@ from typing import Any, cast
 
 from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
 from marl_airhockey.policies.callables import driver_of
@@ -120,6 +120,11 @@ def find_scenario(given: str | Scenario | type[Scenario], **options: Any) -> Sce
     if names_code(given):
         return _scenario(given, load_code(given, Scenario), options)
     return make_scenario(given, **options)
+
+
+def has_goals(given: str | Scenario | type[Scenario]) -> bool:
+    """Return whether a scenario has goals, see `find_scenario`."""
+    return isinstance(find_scenario(given), GoalScenario)
 
 
 def _scenario(name: str, make: Any, options: Mapping[str, Any]) -> Scenario:

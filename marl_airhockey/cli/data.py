@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -82,7 +81,10 @@ def record(
     path = out or new_recording(Path("recordings"), title)
     with real_table(keywords, lab, rig) as table, bar() as shown:
         task = shown.add_task("recording", total=episodes, note="")
-        count = partial(shown.update, task)
+
+        def count(done: float) -> None:
+            shown.update(task, completed=done)
+
         record_episodes(player, name, game, episodes, path, seed, table, film, count)
     show([path], as_json)
 

@@ -72,8 +72,9 @@ def relabel(
 ) -> None:
     """Write a recording as data of other tasks with the same bodies, by name."""
     from marl_airhockey.data.files import one_recording
-    from marl_airhockey.data.hindsight import has_goals, with_hindsight
+    from marl_airhockey.data.hindsight import with_hindsight
     from marl_airhockey.data.relabel import fitting, relabelled
+    from marl_airhockey.registry import has_goals
 
     recording = one_recording(recording)
     names = task or fitting(recording)
@@ -189,8 +190,8 @@ def import_dataset(
 
     folder = out or Path("recordings") / source.strip("/.").replace("/", "-")
     options = settings(option) if option else {}
-    asked = ImportSettings(source, scenario, folder, options, control_dt, root)
-    show([imported(asked)], False)
+    given = ImportSettings(source, scenario, folder, options, control_dt, root)
+    show([imported(given)], False)
 
 
 COMMANDS = (repair, merge, split, convert, relabel, extract, export)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -26,32 +25,36 @@ def get(
 ) -> None:
     """Build a named dataset from its seeds, on this machine, and compare it."""
     require("pyarrow", "data")
-    from marl_airhockey.data.benchmark.build import build_dataset
+    from marl_airhockey.data.benchmark.build import build_dataset, get_dataset
     from marl_airhockey.data.benchmark.catalogue import find_dataset
     from marl_airhockey.data.benchmark.content import content_of, published
-    from marl_airhockey.data.files import dataset_folder
 
-    dataset, folder = find_dataset(name), out or dataset_folder(name)
-    if out is not None or not folder.exists():
-        with bar() as shown:
-            task = shown.add_task(name, total=1.0, note="")
-            count = partial(shown.update, task)
-            build_dataset(dataset, folder, progress=lambda done: count(completed=done))
-    found, wanted = content_of(folder), published()[name]
+    dataset = find_dataset(name)
+    with bar() as shown:
+        task = shown.add_task(name, total=1.0, note="")
+
+        def count(done: float) -> None:
+            shown.update(task, completed=done)
+
+        if out is None:
+            folder = get_dataset(name, count)
+        else:
+            folder = build_dataset(dataset, out, progress=count)
+    found, known = content_of(folder), published()[name]
     console.print(
         f"{folder}: {found.steps} steps, {found.episodes} episodes, "
         f"{found.megabytes:.0f} MB, success {found.success:.3f}, "
         f"return {found.returns:.2f}",
         soft_wrap=True,
     )
-    if found.checksum == wanted.checksum:
+    if found.checksum == known.checksum:
         console.print("content: as published", soft_wrap=True)
     else:
         console.print(
             f"content: checksum {found.checksum[:12]}, published "
-            f"{wanted.checksum[:12]} (success {wanted.success:.3f}, return "
-            f"{wanted.returns:.2f}): other versions or another processor round "
-            "otherwise",
+            f"{known.checksum[:12]} (success {known.success:.3f}, return "
+            f"{known.returns:.2f}): other versions or another processor round "
+            "differently",
             soft_wrap=True,
         )
 

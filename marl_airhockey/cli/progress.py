@@ -43,6 +43,7 @@ class Lines:
     def update(
         self,
         task: TaskID,
+        *,
         completed: float | None = None,
         total: float | None = None,
         note: str | None = None,

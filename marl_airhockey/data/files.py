@@ -93,21 +93,33 @@ def whole_folder(path: Path) -> Iterator[Path]:
     """
     if path.exists():
         raise ValueError(f"{path}: there is such a folder; name another")
-    fresh = not path.parent.exists()
+    with (
+        parent_of(path) as parent,
+        tempfile.TemporaryDirectory(dir=parent, prefix=".part-") as part,
+    ):
+        made = Path(part) / path.name
+        made.mkdir()
+        yield made
+        shutil.move(str(made), path)
+
+
+@contextmanager
+def parent_of(path: Path) -> Iterator[Path]:
+    """Make the folder of a path; remove a new one again if nothing is left in it.
+
+    Raises:
+        ValueError: It cannot be made.
+    """
+    parent, fresh = path.parent, not path.parent.exists()
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        draft = tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-")
+        parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
     try:
-        with draft as part:
-            made = Path(part) / path.name
-            made.mkdir()
-            yield made
-            shutil.move(str(made), path)
+        yield parent
     finally:
-        if fresh and not any(path.parent.iterdir()):
-            path.parent.rmdir()
+        if fresh and not any(parent.iterdir()):
+            parent.rmdir()
 
 
 def named_folder(root: Path | None, name: str) -> Path:

@@ -17,7 +17,7 @@ from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches, new_head
 from marl_airhockey.data.replay import Replay
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
-from marl_airhockey.registry import make_scenario
+from marl_airhockey.registry import has_goals, make_scenario
 from marl_airhockey.types import Array
 
 ACHIEVED, DESIRED = "observation.achieved_goal", "observation.desired_goal"
@@ -69,11 +69,6 @@ def with_hindsight(
         if not writer.episodes:
             raise ValueError(f"{path}: no goal of {scenario} was reached in it")
     return out
-
-
-def has_goals(scenario: str) -> bool:
-    """Return whether a scenario has goals."""
-    return isinstance(make_scenario(scenario), GoalScenario)
 
 
 def _kept(name: str) -> bool:

@@ -24,6 +24,7 @@ from marl_airhockey.core.recording import (
     Column,
     Columns,
 )
+from marl_airhockey.data.files import parent_of
 from marl_airhockey.data.parquet import EXTRA, table_of, write_table
 from marl_airhockey.data.parts import merge_parts, part_path, parts_of
 
@@ -44,21 +45,19 @@ def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWr
     Raises:
         ValueError: There is such a folder.
     """
-    fresh = not path.parent.exists()
-    try:
-        writer = RecordingWriter(path, {**head, "columns": {}})
-    except FileExistsError as error:
-        raise ValueError(f"{path}: there is such a folder; name another") from error
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
-    try:
-        with writer:
-            yield writer
-    except BaseException:
-        shutil.rmtree(path, ignore_errors=True)
-        if fresh and not any(path.parent.iterdir()):
-            path.parent.rmdir()
-        raise
+    with parent_of(path):
+        try:
+            writer = RecordingWriter(path, {**head, "columns": {}})
+        except FileExistsError as error:
+            raise ValueError(f"{path}: there is such a folder; name another") from error
+        except OSError as error:
+            raise ValueError(f"{path}: cannot be made: {error.strerror}") from error
+        try:
+            with writer:
+                yield writer
+        except BaseException:
+            shutil.rmtree(path, ignore_errors=True)
+            raise
 
 
 class RecordingWriter:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -10,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.core.table import Table
+from marl_airhockey.data.exchange.rows import read_rows
 from marl_airhockey.types import Array
 
-COLUMNS = ("t", "x", "y")
-PADDLE_COLUMNS = ("paddle_x", "paddle_y")
 SLOWEST_RATE = 50.0
 """Lowest rate of a track, 1/s: flights between banks must last several rows."""
 WINDOW = 4
@@ -80,23 +78,8 @@ def read_track(path: Path, table: Table, origin: str = "centre") -> Track:
     """
     if origin not in ("centre", "corner"):
         raise ValueError(f"--origin: {origin!r} is neither centre nor corner")
-    try:
-        with path.open(newline="") as file:
-            reader = csv.DictReader(file)
-            header = tuple(name.strip() for name in reader.fieldnames or ())
-            missing = [name for name in COLUMNS if name not in header]
-            if missing:
-                raise ValueError(
-                    f"{path}: column {missing[0]!r} is missing; the first line must be "
-                    "t,x,y, optionally with paddle_x,paddle_y"
-                )
-            reader.fieldnames = list(header)
-            has_paddle = all(name in header for name in PADDLE_COLUMNS)
-            names = (*COLUMNS, *(PADDLE_COLUMNS if has_paddle else ()))
-            rows = [_numbers(path, reader.line_num, row, names) for row in reader]
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from error
-    values = np.array(rows).reshape(-1, len(names))
+    values = read_rows(path)
+    has_paddle = bool(np.isfinite(values[:, 3:]).any())
     values = values[np.isfinite(values[:, :3]).all(1)]
     steps = np.diff(values[:, 0])
     if len(values) < 2 * SHORTEST or (steps <= 0.0).any():
@@ -112,18 +95,6 @@ def read_track(path: Path, table: Table, origin: str = "centre") -> Track:
     low = np.asarray(table.vertices).min(0) if origin == "corner" else np.zeros(2)
     paddle = values[:, 3:5] + low if has_paddle else None
     return Track(values[:, 0], values[:, 1:3] + low, paddle)
-
-
-def _numbers(
-    path: Path, line: int, row: dict[str, str], names: tuple[str, ...]
-) -> list[float]:
-    """Return the numbers of a row; an empty cell is nan."""
-    try:
-        return [float(row[name]) if row[name] else np.nan for name in names]
-    except (TypeError, ValueError):
-        raise ValueError(
-            f"{path}, line {line}: expected numbers for {', '.join(names)}"
-        ) from None
 
 
 def cut(track: Track, table: Table) -> tuple[Flights, Contacts]:

@@ -31,6 +31,7 @@ import typer
 from marl_airhockey import make_agent
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.data.benchmark.build import get_dataset
+from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.data.record import record_steps
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
 from marl_airhockey.lab.calibration.lab_rig import lab_rig
@@ -92,10 +93,6 @@ def _through_the_lab(policy: Driver, task: str) -> EvaluationResult:
 
 
 ROBOT_SIDE: Keywords = {"profile": "ur5e", "options": {"table": "full_size"}}
-TASKS = (
-    *("reach", "reach_velocity", "touch", "strike", "strike_crowd", "juggle"),
-    *("puck_velocity", "move_block", "hit_goal", "hit_goal_velocity"),
-)
 DOMAINS = {
     "2d": Domain(
         TASKS,

@@ -18,9 +18,10 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
-from tasks import DATA, EPISODES, TASKS, THRESHOLDS, Row, Rows, config_of, read
+from tasks import DATA, EPISODES, THRESHOLDS, Row, Rows, config_of, read
 
 from marl_airhockey import make_agent
+from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.plots import plot_seed_curves

@@ -28,6 +28,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.train import run_training
@@ -35,10 +36,6 @@ from marl_airhockey.policies.load import load_policy
 from marl_airhockey.sensing.simulated_camera import SENSED
 from marl_airhockey.world.build import Keywords
 
-TASKS = (
-    *("reach", "reach_velocity", "touch", "strike", "strike_crowd", "juggle"),
-    *("puck_velocity", "move_block", "hit_goal", "hit_goal_velocity"),
-)
 EPISODES, SLOW_EPISODES = 2000, 200
 """Episodes by which a policy is measured, and on the slower backends"""
 THRESHOLDS = (0.5, 0.9, 0.95)

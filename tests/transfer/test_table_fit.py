@@ -161,7 +161,7 @@ def test_the_command_writes_physics_that_can_be_played(tmp_path):
     ("text", "error"),
     [
         ("t,x\n0,1\n", "column 'y' is missing"),
-        ("t,x,y\n0,1,a\n", "line 2: expected numbers"),
+        ("t,x,y\n0,1,a\n", "line 2: 'a' is no number"),
         ("t,x,y\n0,1,2\n", "1 rows whose times must grow"),
         (
             "t,x,y\n" + "".join(f"{k * 0.1},0,0\n" for k in range(20)),

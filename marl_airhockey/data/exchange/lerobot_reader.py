@@ -180,7 +180,7 @@ def _columns(
         shown = np.concatenate([shown, end[None]])[:, None]
         first[column], after[column] = shown[0], shown[1:]
     done = frames["next.done"].astype(bool)
-    cut = frames.get("next.truncated", np.zeros(len(done), bool)).astype(bool)
+    truncated = frames.get("next.truncated", np.zeros(len(done), bool)).astype(bool)
     reward = frames["next.reward"].astype(np.float64)[:, None]
     success = frames.get("next.success", np.zeros(len(done), bool)).astype(bool)
     return first, {
@@ -189,6 +189,6 @@ def _columns(
         "reward": reward,
         "returns": np.cumsum(reward, axis=0),
         "success": success[:, None],
-        "terminated": frames.get("next.terminated", done & ~cut).astype(bool),
-        "truncated": cut,
+        "terminated": frames.get("next.terminated", done & ~truncated).astype(bool),
+        "truncated": truncated,
     }

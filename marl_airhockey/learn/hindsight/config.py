@@ -6,11 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
-from marl_airhockey.registry import find_scenario, scenario_names
+from marl_airhockey.registry import has_goals, scenario_names
 
 ALGO = "sac_her"
 """Name of the algorithm"""
@@ -65,11 +64,6 @@ class HindsightConfig(RunConfig):
             raise ValueError(
                 f"{self.scenario}: it has no goals, as {ALGO} needs; {known} have"
             )
-
-
-def has_goals(scenario: str) -> bool:
-    """Return True for a scenario with goals."""
-    return isinstance(find_scenario(scenario), GoalScenario)
 
 
 def hindsight_config(scenario: str, changes: Mapping[str, Any]) -> HindsightConfig:
