@@ -86,6 +86,12 @@ class HitGoal(FewShots, GoalScenario):
         """(...) bool: a touched, rising puck has been inside the circle in time."""
         return t.new_memory["entered"]
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: within 0.15 m of the goal, rising."""
+        puck, velocity = t.after.puck[..., 0, :], t.after.puck_velocity[..., 0, :]
+        near = length(puck - t.memory["goal"]) < 0.15
+        return np.asarray(near & (velocity[..., 0] > 0))
+
     @property
     def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, 1.0)

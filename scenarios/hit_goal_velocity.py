@@ -127,6 +127,11 @@ class HitGoalVelocity(FewShots, GoalScenario):
         """(...) bool: a rising puck has matched the goal in position and velocity."""
         return t.new_memory["entered"]
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: within 0.1012 m of the goal, at any velocity."""
+        gap = length(t.after.puck[..., 0, :] - t.memory["goal"])
+        return np.asarray(gap < 0.1012)
+
     @property
     def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, 5.0, 5.0, 1.0)

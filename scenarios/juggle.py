@@ -86,6 +86,17 @@ class Juggle(Scenario):
         """(...) bool: the puck has been hit up ``hits`` times."""
         return np.asarray(t.new_memory["hits"] >= self.hits)
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: after 2.5 s the puck is up to a quarter above the middle line.
+
+        A quarter of the far half; not with the paddle near the middle line.
+        """
+        half = self.table_geometry.size[0] / 2
+        x, paddle = t.after.puck[..., 0], t.after.paddle[..., 0, 0]
+        inside = ((x > 0) & (x < half / 4)).any(-1)
+        back = paddle < -4 * self.table_geometry.paddle_radius
+        return np.asarray(inside & back & (t.after.time > 2.5))
+
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         armed = memory["struck_at"][memory["armed"] > 0]
         return [Mark.across(self.table_geometry, x + self.lift) for x in armed]

@@ -131,5 +131,14 @@ class MoveBlock(FewShots):
         """(...) bool: a shot has moved the block by ``way``."""
         return np.asarray(t.new_memory["moved"] >= self.way)
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: after 0.25 s the block moves by a 5000th of the diagonal.
+
+        Within a step here, since its start there; whatever the cause.
+        """
+        least = np.hypot(*self.table_geometry.size) / 5000
+        moved = length(t.after.block[..., 0, :] - t.before.block[..., 0, :]) > least
+        return np.asarray(moved & (t.after.time > 0.25))
+
 
 make = MoveBlock

@@ -60,5 +60,10 @@ class PuckVelocity(FallingPuck):
         """(...) bool: the puck has risen at ``fast`` after a touch."""
         return np.asarray(t.new_memory["rise"] >= self.fast)
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: after 1.25 s the puck is 0.5 m above the middle line."""
+        high = t.after.puck[..., 0, 0] > 0.5
+        return np.asarray(high & (t.after.time > 1.25))
+
 
 make = PuckVelocity

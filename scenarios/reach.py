@@ -101,6 +101,10 @@ class Reach(GoalScenario):
         near = t.new_memory["gap"] < self.radius
         return np.asarray(near & self._rests(t.new_memory))
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: within 0.05 m of the goal, at any speed."""
+        return np.asarray(t.new_memory["gap"] < 0.05)
+
     @property
     def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, 1.5 * self.scene.seats[0].speed)

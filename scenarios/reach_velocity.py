@@ -117,6 +117,21 @@ class ReachVelocity(GoalScenario):
         """(...) bool: the paddle has matched the goal in position and velocity."""
         return t.new_memory["passed"]
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: nearer than a tenth of the diagonal, at a similar velocity.
+
+        The velocity's score is the mean of (1 + cosine) / 2 and of 1 less the error of
+        the speed over 2.83 m/s; it has to be 0.8.
+        """
+        gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
+        velocity, wanted = t.after.paddle_velocity[..., 0, :], t.memory["goal_velocity"]
+        speed, wanted_speed = length(velocity), length(wanted)
+        cosine = (velocity * wanted).sum(-1) / (speed * wanted_speed + 1e-8)
+        alike = 1 - np.abs(speed - wanted_speed) / np.sqrt(8.0)
+        score = ((1 + cosine) / 2 + alike) / 2
+        tenth = 0.1 * np.hypot(*self.table_geometry.size)
+        return np.asarray((gap <= tenth) & (score >= 0.8))
+
     @property
     def goal_bounds(self) -> tuple[float, ...]:
         top = 1.5 * self.scene.seats[0].speed

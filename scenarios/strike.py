@@ -95,5 +95,9 @@ class Strike(Scenario):
         """(...) bool: the puck was fast and far from the paddle in one step."""
         return t.new_memory["struck"]
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: the puck is faster than 0.2 m/s."""
+        return np.asarray(length(t.after.puck_velocity[..., 0, :]) > 0.2)
+
 
 make = Strike

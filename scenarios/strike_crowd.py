@@ -123,5 +123,11 @@ class StrikeCrowd(Scenario):
         """(...) bool: the blocks have moved by ``spread`` in all."""
         return np.asarray(t.new_memory["spread"] >= self.spread)
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: displacements add up to a tenth of the diagonal."""
+        spread = length(t.after.block - t.memory["origin"]).sum(-1)
+        tenth = 0.1 * np.hypot(*self.table_geometry.size)
+        return np.asarray((spread > tenth) & (t.after.time > 0.15))
+
 
 make = StrikeCrowd

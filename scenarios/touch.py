@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from marl_airhockey.toolkit import (
     Array,
     Memory,
     Transition,
+    length,
     rewards,
 )
 from marl_airhockey.toolkit.falling import FallingPuck
@@ -44,6 +47,12 @@ class Touch(FallingPuck):
     def success(self, t: Transition) -> Array:
         """(...) bool: any distinct touch."""
         return rewards.touched(t.new_memory)
+
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: within 0.02 m of a touch."""
+        gap = length(t.after.puck[..., 0, :] - t.after.paddle[..., 0, :])
+        table = self.table_geometry
+        return np.asarray(gap < table.paddle_radius + table.puck_radius + 0.02)
 
 
 make = Touch

@@ -56,6 +56,8 @@ class Scenario(ABC):
     """Table preset."""
     goals: str = "flat"
     """"dict" shows desired and achieved goals separately, as HER needs them."""
+    rules: str = "own"
+    """"paper" judges by the published code of the paper: `paper_success`."""
     jitter_weight: float = 0.01
     """Cost of a squared change of the commanded velocity, in top speeds."""
     turning_weight: float = 0.0
@@ -88,6 +90,13 @@ class Scenario(ABC):
             raise ValueError("seconds: must be above 0")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
             raise ValueError('goals="dict": this scenario has no desired goal')
+        if self.rules not in ("own", "paper"):
+            raise ValueError(unknown_name("rules", self.rules, ("own", "paper")))
+        if self.rules == "paper":
+            if type(self).paper_success is Scenario.paper_success:
+                raise ValueError('rules="paper": not one of the ten tasks of the paper')
+            if self.goals == "dict":
+                raise ValueError('rules="paper": with goals="dict" the goal decides')
         if self.goals == "dict" and self.reaction:
             raise ValueError('reaction: with goals="dict" seats see goals at once')
 
@@ -167,6 +176,15 @@ class Scenario(ABC):
     def success(self, t: Transition) -> Array:
         """(...) or (..., seats) bool: the success that is reported; latched."""
 
+    def paper_success(self, t: Transition) -> Array:
+        """(...) bool: the success of the paper's published code at this step.
+
+        From github.com/CalCharles/air-hockey-rl, commits aee389d and 747580d, whose x
+        has the opposite sign. With rules="paper" it is the success, ends the episode
+        and is paid; so is a puck lost at home, without a price of its own.
+        """
+        raise NotImplementedError(f"{type(self).__name__} is not a task of the paper")
+
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         """Return what to draw for one world, leading axes gone."""
         return []
@@ -204,6 +222,7 @@ class Scenario(ABC):
         """Return all reward terms, with the regularizing ones, (..., seats) each.
 
         goal: 1 while the goal is met, with goals="dict" instead of all others.
+        success: with rules="paper" 3 once, by these rules.
         jitter: ``-jitter_weight`` times the squared change of the commanded velocity,
         in top speeds.
         turning: ``-turning_weight`` times the cost of a sudden change of direction.
@@ -212,6 +231,8 @@ class Scenario(ABC):
             met = self.goal_met(t.after, t.new_memory)
             return {"goal": met[..., None].astype(np.float64)}
         terms = self.reward_terms(t)
+        if self.rules == "paper":
+            terms["success"] = 3.0 * self.paper_success(t)[..., None]
         if self.jitter_weight:
             cost = _jitter(t.before, t.command, self.scene.seats[0].speed)
             terms["jitter"] = -self.jitter_weight * cost
@@ -222,10 +243,16 @@ class Scenario(ABC):
     def is_terminated(self, t: Transition) -> Array:
         """(...) bool: `terminated`; with goals="dict", the goal is met.
 
+        With rules="paper" a success and a puck lost at home.
+
         Without serves, a puck that was lifted off the table ends the episode, too.
         """
-        met = self.goals == "dict"
-        ends = self.goal_met(t.after, t.new_memory) if met else self.terminated(t)
+        if self.goals == "dict":
+            ends = self.goal_met(t.after, t.new_memory)
+        elif self.rules == "paper":
+            ends = self.paper_success(t) | t.after.crossed.any((-1, -2))
+        else:
+            ends = self.terminated(t)
         if self.needs_serve(t) is None:
             ends = ends | t.after.lifted.any(-1)
         return ends
@@ -234,7 +261,7 @@ class Scenario(ABC):
         """(...) or (..., seats) bool: `success`; with goals="dict" the goal is met."""
         if self.goals == "dict":
             return self.goal_met(t.after, t.new_memory)
-        return self.success(t)
+        return self.paper_success(t) if self.rules == "paper" else self.success(t)
 
     def goal_met(self, state: State, memory: Memory) -> Array:
         """(...) bool: the desired goal is met at a state, by `goal_reward` alone."""

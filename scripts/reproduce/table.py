@@ -3,6 +3,8 @@
     python scripts/reproduce/table.py --seeds 3 --jobs 2
     python scripts/reproduce/table.py --domain lab --jobs 1     # on an idle machine
     python scripts/reproduce/table.py --tier medium-expert --algos bc,bc10,iql,rebrac
+    python scripts/reproduce/table.py --domain paper --algos random,rl --seeds 3
+    python scripts/reproduce/table.py --domain paper --seeds 1
 
 BC and IQL learn from 100,000 steps of an expert, 20,000 and 40,000 steps of the
 gradient. A cell that ends adds a row to ``docs/data/offline.csv``; one whose row is
@@ -12,6 +14,8 @@ there is not trained again, so the script can be stopped and started.
 * robosuite: data are of the zoo's policy on robosuite; 50 episodes there.
 * lab: data are of ``zoo/TASK_full_size`` in the profile ur5e; 20 episodes through the
   camera and the arm of the virtual lab.
+* paper: rules, table and physics of the paper's code; data are of seed 0 of rl, which
+  is PPO with the presets; random are random actions.
 
 No seed of an evaluation is that of a recording. ``offline_tables.py`` prints the
 tables of these rows.
@@ -30,12 +34,14 @@ import typer
 
 from marl_airhockey import make_agent
 from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.core.parameters import PRESETS
 from marl_airhockey.data.benchmark.build import get_dataset
 from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.data.record import record_steps
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
 from marl_airhockey.lab.calibration.lab_rig import lab_rig
 from marl_airhockey.learn.offline.config import offline_config
+from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.world.build import Keywords
@@ -48,6 +54,8 @@ ALGOS: dict[str, tuple[str, dict[str, Any]]] = {
     "rebrac": ("rebrac", {"total_steps": 40_000}),
 }
 """Algorithms and their settings by column; bc10 clones the best tenth of episodes"""
+COLUMNS = ("random", *ALGOS, "rl")
+"""What rows are of"""
 EXPERT = "expert"
 SEED = 10_000_000
 """Seed of the first recorded episode, far from those of evaluations"""
@@ -92,6 +100,37 @@ def _through_the_lab(policy: Driver, task: str) -> EvaluationResult:
         return evaluate(policy, task, episodes=20, backend="real", rig=str(rig))
 
 
+def paper_environment(task: str) -> Keywords:
+    """Return rules, table and physics of the paper's code; strikes are on the level."""
+    level = {"tilt": 0.0} if task.startswith("strike") else {}
+    return {
+        "options": {"rules": "paper", "table": "full_size"},
+        "physics": {**PRESETS["authors"], **level},
+    }
+
+
+def _of_rl(task: str, tier: str, folder: Path) -> Path:
+    run = train_rl(task, 0, folder)
+    policy, name = load_policy(run / "last.npz"), folder / f"paper-{task}"
+    if not name.exists():
+        settings = paper_environment(task)
+        record_steps(policy, "rl", task, 100_000, name, SEED, settings)
+    return name
+
+
+def train_rl(task: str, seed: int, folder: Path) -> Path:
+    """Train PPO under the paper's rules, if that is not done; return its folder."""
+    place = folder / f"paper-{task}-rl-{seed}"
+    config = preset(task, {**paper_environment(task), "seed": seed})
+    run_training(None if (place / "config.toml").exists() else config, place)
+    return place
+
+
+def _by_the_paper(player: Driver, task: str) -> EvaluationResult:
+    settings = paper_environment(task)
+    return evaluate(player, task, episodes=500, name=task, exact=True, **settings)
+
+
 ROBOT_SIDE: Keywords = {"profile": "ur5e", "options": {"table": "full_size"}}
 DOMAINS = {
     "2d": Domain(
@@ -121,6 +160,7 @@ DOMAINS = {
         ),
         _through_the_lab,
     ),
+    "paper": Domain(TASKS, _of_rl, _by_the_paper),
 }
 """Domains by name: tasks, recordings and evaluation"""
 
@@ -129,20 +169,33 @@ def train_cell(
     name: str, tier: str, task: str, column: str, seed: int, folder: Path
 ) -> Row:
     """Train one cell and return its row."""
-    domain, (algo, settings) = DOMAINS[name], ALGOS[column]
-    data = domain.record(task, tier, folder)
-    changes = {"seed": seed, "evaluations": 1, "eval_episodes": 50, **settings}
-    config = offline_config(algo, [data], changes)
-    place = folder / f"{name}-{tier}-{task}-{column}-{seed}"
-    row = run_training(None if (place / "config.toml").exists() else config, place)
-    found = domain.measure(load_policy(place / "last.npz"), task)
-    minutes = round(row["learning_cpu_seconds"] / 60, 2)
+    domain, steps, minutes = DOMAINS[name], 0, 0.0
+    player: Driver = make_agent("random")
+    if column != "random":
+        place = folder / f"{name}-{tier}-{task}-{column}-{seed}"
+        if column == "rl":
+            place = train_rl(task, seed, folder)
+        else:
+            learn(domain.record(task, tier, folder), column, seed, place)
+        last = read(place / "evaluations.csv")[-1]
+        steps = int(last["steps"])
+        minutes = round(float(last["learning_cpu_seconds"]) / 60, 2)
+        player = load_policy(place / "last.npz")
+    found = domain.measure(player, task)
     values = (
         *(name, tier, task, column, seed),
         *(round(found.success, 4), round(found.returns, 4), found.episodes),
-        *(int(row["steps"]), minutes),
+        *(steps, minutes),
     )
     return dict(zip(FIELDS, values, strict=True))
+
+
+def learn(data: Path, column: str, seed: int, place: Path) -> None:
+    """Train a column's algorithm from recordings into a folder, or go on with it."""
+    algo, settings = ALGOS[column]
+    changes = {"seed": seed, "evaluations": 1, "eval_episodes": 50, **settings}
+    config = offline_config(algo, [data], changes)
+    run_training(None if (place / "config.toml").exists() else config, place)
 
 
 def read(path: Path) -> list[Row]:
@@ -162,7 +215,7 @@ def keep(row: Row) -> None:
             domains.index(r["domain"]),
             r["tier"],
             TASKS.index(r["task"]),
-            list(ALGOS).index(r["algo"]),
+            COLUMNS.index(r["algo"]),
             int(r["seed"]),
         )
     )
@@ -175,7 +228,7 @@ def keep(row: Row) -> None:
 
 
 def main(
-    domain: Annotated[str, typer.Option(help="2d, robosuite or lab.")] = "2d",
+    domain: Annotated[str, typer.Option(help="2d, robosuite, lab or paper.")] = "2d",
     tier: Annotated[str, typer.Option(help="Tier of the datasets of 2d.")] = EXPERT,
     tasks: Annotated[str, typer.Option(help="Comma-separated; all of them.")] = "",
     algos: Annotated[str, typer.Option(help="Comma-separated.")] = "bc,iql",
@@ -196,7 +249,8 @@ def main(
         for task in chosen
         if (domain, tier, task, algo, seed) not in known
     ]
-    for task in {cell[2] for cell in wanted}:  # Once, not in each process.
+    learners = {cell[2] for cell in wanted if cell[3] in ALGOS}
+    for task in sorted(learners, key=TASKS.index):  # Once, not in each process.
         DOMAINS[domain].record(task, tier, folder)
     with ProcessPoolExecutor(jobs) as pool:
         cells = [pool.submit(train_cell, *cell, folder) for cell in wanted]
