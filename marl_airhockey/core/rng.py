@@ -90,6 +90,9 @@ class RandomStreams:
     advances only the worlds that draw again.
     """
 
+    spread: float = 1.0
+    """Share of every range, about its middle, in which `uniform` draws"""
+
     def __init__(self, keys: Array, counts: Array, rows: Array) -> None:
         self._keys, self._counts, self._rows = keys, counts, rows
 
@@ -111,20 +114,28 @@ class RandomStreams:
 
     def select(self, rows: Array | slice) -> RandomStreams:
         """Return the streams of ``rows`` (a mask or indices into these rows)."""
-        return RandomStreams(self._keys, self._counts, self._rows[rows])
+        some = RandomStreams(self._keys, self._counts, self._rows[rows])
+        some.spread = self.spread
+        return some
 
-    def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
-        """Draw (W, *shape) numbers uniform in [low, high)."""
+    def _units(self, *shape: int) -> Array:
+        """Draw (W, *shape) numbers uniform in [0, 1)."""
         unit = np.empty((len(self._rows), math.prod(shape)))
         _unit(self._keys, self._counts, self._rows, unit)
-        drawn = unit.reshape(len(unit), *shape)
+        return unit.reshape(len(unit), *shape)
+
+    def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
+        """Draw (W, *shape) numbers uniform in [low, high), narrowed by `spread`."""
+        drawn = self._units(*shape)
+        if self.spread != 1.0:
+            drawn = 0.5 + self.spread * (drawn - 0.5)
         drawn *= high - low
         drawn += low
         return drawn
 
     def normal(self, *shape: int) -> Array:
         """Draw (W, *shape) standard normal numbers (Box and Muller's transform)."""
-        pair = self.uniform(0.0, 1.0, 2, *shape)
+        pair = self._units(2, *shape)
         radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))
 

@@ -34,6 +34,9 @@ from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
+MASTERED, FEWEST_EPISODES, WIDER = 0.8, 20, 0.05
+"""Success in the episodes of a rollout, and their number, that widen a curriculum's
+ranges of starts, and by how much."""
 
 
 @dataclass
@@ -50,6 +53,8 @@ class Rollout:
     """0 where an episode ended with the step, else 1"""
     cut: list[tuple[int, int, Any]]
     """Step, slot and last observation of episodes that the clock ended"""
+    success: list[bool]
+    """Success of the episodes that ended"""
 
 
 def generalized_advantage(
@@ -103,6 +108,7 @@ class Trainer:
             self._load(run.folder / "last.pt", whole=True)
         elif config.init:
             self._begin_with(Path(config.init))
+        self._widen([])
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
         self._log = RunLog(run.folder, run.progress.steps)
@@ -118,6 +124,7 @@ class Trainer:
             steps = run.progress.steps + rollout.reward.numel()
             divergence = self._update(rollout, 1.0 - steps / self._config.total_steps)
             self._rate.adapt(divergence)
+            self._widen(rollout.success)
             run.update_progress(steps, self._rate.rate)
             if run.evaluation_due or run.steps_left <= 0:
                 row = self._evaluate()
@@ -125,6 +132,16 @@ class Trainer:
         self._log.close()
         self._env.close()
         return row
+
+    def _widen(self, success: list[bool]) -> None:
+        """Widen the ranges of starts of a curriculum where they are mastered."""
+        if not self._config.curriculum:
+            return
+        progress = self._run.progress
+        spread = progress.start_spread or self._config.curriculum
+        if len(success) >= FEWEST_EPISODES and np.mean(success) >= MASTERED:
+            spread = min(spread + WIDER, 1.0)
+        self._env.world.start_spread = progress.start_spread = spread
 
     def _collect(self) -> Rollout:
         """Play ``n_steps`` steps of all slots."""
@@ -136,6 +153,7 @@ class Trainer:
             torch.empty(shape),
             torch.empty(shape),
             torch.ones(shape),
+            [],
             [],
         )
         with torch.inference_mode():
@@ -150,9 +168,11 @@ class Trainer:
                 self._seen, reward, done, infos = env.step(asked)
                 kept.reward[t] = torch.from_numpy(reward)
                 kept.going[t] = torch.from_numpy(1.0 - done)
+                ended = np.flatnonzero(done).tolist()
+                kept.success += [infos[i]["is_success"] for i in ended]
                 kept.cut += [
                     (t, i, infos[i]["terminal_observation"])
-                    for i in np.flatnonzero(done).tolist()
+                    for i in ended
                     if infos[i]["TimeLimit.truncated"]
                 ]
                 note_step(self._log, env)

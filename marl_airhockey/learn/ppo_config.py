@@ -28,6 +28,7 @@ class PPOConfig(SelfPlayConfig):
     MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
         *SelfPlayConfig.MAY_BE_ZERO,
         "num_env_runners",
+        "curriculum",
         "ent_coef",
         "log_std_init",
     )
@@ -37,6 +38,9 @@ class PPOConfig(SelfPlayConfig):
     """Number of processes in which rllib steps worlds; 0 for the learner's"""
     init: str = ""
     """Folder of a run of the same engine and network size, to begin with its weights"""
+    curriculum: float = 0.0
+    """Share of the ranges of starts and goals, about their middles, with which training
+    begins; they widen as it succeeds. 0: whole from the beginning. Engine torch"""
     n_steps: int
     """Steps of each world in a rollout"""
     n_epochs: int
@@ -58,6 +62,10 @@ class PPOConfig(SelfPlayConfig):
                 f"engine: {self.engine} learns from flat observations; take sb3 for "
                 'observe="pixels" and goals="dict"'
             )
+        if not 0 <= self.curriculum <= 1:
+            raise ValueError(f"curriculum: {self.curriculum} must be in 0 .. 1")
+        if self.curriculum and (self.engine != "torch" or self.self_play):
+            raise ValueError("curriculum: only tasks on the engine torch have one")
         if self.engine == "rllib":
             self._check_rllib()
         if self.rollout % self.batch_size:

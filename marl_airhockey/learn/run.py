@@ -33,6 +33,8 @@ class Progress:
     """CPU time before the first step: compiling, building worlds and networks"""
     wall_seconds: float = 0.0
     rate: float = 0.0
+    start_spread: float = 0.0
+    """Share of the ranges of starts in a curriculum; 0 before its beginning"""
     best: tuple[float, float] = (-1.0, float("-inf"))
     """First metric and return of the best evaluation"""
 

@@ -251,6 +251,10 @@ def inside(rng: RandomStreams, scene: Scene, seat: int, margin: float = 0.0) -> 
     return np.asarray(ego @ scene.table.rotation(scene.seats[seat].side))
 
 
+NARROW_TRIES = 50
+"""Number of draws from narrowed ranges before whole ones are taken."""
+
+
 def redraw(
     rng: RandomStreams,
     sample: Callable[[RandomStreams], Array],
@@ -258,13 +262,18 @@ def redraw(
 ) -> Array:
     """Draw rows by ``sample``, each again until ``accept`` is True for it.
 
+    Rows that narrowed ranges do not give (`RandomStreams.spread`) are drawn from whole
+    ones.
+
     Raises:
         RuntimeError: a row that is not accepted in 1000 tries.
     """
     rows = sample(rng)
-    for _ in range(1000):
+    for k in range(1000):
         again = np.flatnonzero(~accept(rows))
         if not len(again):
             return rows
-        rows[again] = sample(rng.select(again))
+        some = rng.select(again)
+        some.spread = some.spread if k < NARROW_TRIES else 1.0
+        rows[again] = sample(some)
     raise RuntimeError("start: no acceptable first state in 1000 tries")

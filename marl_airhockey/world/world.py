@@ -98,6 +98,8 @@ class World:
         self._sensed = self._known = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
+        self.start_spread = 1.0
+        """Share of the ranges, about their middles, from which episodes start"""
         self.closed = False
         """True after `close`"""
 
@@ -267,6 +269,7 @@ class World:
             self.backend.set_physics(self._episode.physics, changed)
         self._key_scatter(worlds)
         rng = self._streams.of("start", worlds)
+        rng.spread = self.start_spread
         if rows is None:
             rows, memory = self.scenario.reset(rng, len(worlds))
         else:
