@@ -103,12 +103,13 @@ def _through_the_lab(policy: Driver, task: str) -> EvaluationResult:
 def paper_environment(task: str) -> Keywords:
     """Return rules, table and physics of the paper's code.
 
-    Its paddles reach 2 m/s within a step; here they need two. Strikes are on the level.
+    Its paddles have their half of the table and reach 2 m/s within a step; here they
+    need two. Strikes are on the level.
     """
     paddle = {"paddle_speed": 2.0, "paddle_acceleration": 20.0}
     level = {"tilt": 0.0} if task.startswith("strike") else {}
     return {
-        "options": {"rules": "paper", "table": "full_size"},
+        "options": {"rules": "paper", "table": "full_size", "seats": "arcade"},
         "physics": {**PRESETS["authors"], **paddle, **level},
     }
 
