@@ -60,7 +60,7 @@ class FreeForAll(Scenario):
 
     @cached_property
     def table_geometry(self) -> Table:
-        return Table.regular(self.sides, self.inradius)
+        return self.furnished(Table.regular(self.sides, self.inradius))
 
     @cached_property
     def scene(self) -> Scene:

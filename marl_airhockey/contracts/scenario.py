@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import SEAT_KINDS, Seat, make_seat
 from marl_airhockey.core.state import State
-from marl_airhockey.core.table import TABLES, Table
+from marl_airhockey.core.table import TABLES, Obstacle, Table
 from marl_airhockey.core.touches import count_touches, no_touches
 from marl_airhockey.types import Array, Memory
 
@@ -58,6 +58,15 @@ class Scenario(ABC):
     """"dict" shows desired and achieved goals separately, as HER needs them."""
     rules: str = "own"
     """"paper" judges by the published code of the paper: `paper_success`."""
+    obstacles: tuple[tuple[float, ...], ...] = ()
+    """Obstacles on the table: discs x, y, radius, or bars x, y, radius, x2, y2 between
+    two points (m)."""
+    reward_regions: tuple[tuple[float, ...], ...] = ()
+    """Discs x, y, radius (m) and what they pay per second to a seat whose paddle's
+    centre is inside; below 0 for regions to avoid."""
+    drag_regions: tuple[tuple[float, ...], ...] = ()
+    """Discs x, y, radius (m) and the linear drag (1/s) that is added to the puck's
+    while its centre is inside, from one control step to the next."""
     jitter_weight: float = 0.01
     """Cost of a squared change of the commanded velocity, in top speeds."""
     turning_weight: float = 0.0
@@ -84,10 +93,15 @@ class Scenario(ABC):
             raise ValueError(
                 unknown_name("form of goals", self.goals, ("flat", "dict"))
             )
+        for name, sizes in ELEMENTS.items():
+            found = _elements(name, getattr(self, name), sizes)
+            object.__setattr__(self, name, found)
         for f in fields(self):
             _check_number(f.name, f.type, getattr(self, f.name))
         if self.seconds == 0:
             raise ValueError("seconds: must be above 0")
+        if self.obstacles and not self.scene.obstacles:
+            raise ValueError("obstacles: this scenario's own table takes none")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
             raise ValueError('goals="dict": this scenario has no desired goal')
         if self.rules not in ("own", "paper"):
@@ -203,8 +217,16 @@ class Scenario(ABC):
 
     @cached_property
     def table_geometry(self) -> Table:
-        """Table of the option ``table``."""
-        return TABLES[self.table]
+        """Table of the option ``table``, with the obstacles."""
+        return self.furnished(TABLES[self.table])
+
+    def furnished(self, table: Table) -> Table:
+        """Return a table with the obstacles on it."""
+        posts = [
+            Obstacle((x, y), radius, (end[0], end[1]) if end else None)
+            for x, y, radius, *end in self.obstacles
+        ]
+        return replace(table, obstacles=tuple(posts))
 
     def seat(self, side: int = 0, others: tuple[int, ...] = (), team: int = 0) -> Seat:
         """Return a seat of the chosen kind at a side of the table."""
@@ -226,6 +248,7 @@ class Scenario(ABC):
         jitter: ``-jitter_weight`` times the squared change of the commanded velocity,
         in top speeds.
         turning: ``-turning_weight`` times the cost of a sudden change of direction.
+        regions: what the regions pay in which the seat's paddle is.
         """
         if self.goals == "dict":
             met = self.goal_met(t.after, t.new_memory)
@@ -238,7 +261,20 @@ class Scenario(ABC):
             terms["jitter"] = -self.jitter_weight * cost
         if self.turning_weight:
             terms["turning"] = -self.turning_weight * _turning(t.before, t.command)
+        if self.reward_regions:
+            paid = _sums(t.after.paddle, self.reward_regions)
+            terms["regions"] = paid * (t.after.time - t.before.time)[..., None]
         return terms
+
+    def added_drag(self, state: State) -> Array:
+        """(..., pucks) linear drag that regions add, 1/s."""
+        return _sums(state.puck, self.drag_regions)
+
+    def all_marks(self, state: State, memory: Memory) -> list[Mark]:
+        """Return what to draw for one world: `marks`, and the regions."""
+        regions = (*self.reward_regions, *self.drag_regions)
+        circles = [Mark.circle(np.array(r[:2]), r[2]) for r in regions]
+        return [*circles, *self.marks(state, memory)]
 
     def is_terminated(self, t: Transition) -> Array:
         """(...) bool: `terminated`; with goals="dict", the goal is met.
@@ -285,6 +321,34 @@ class Scenario(ABC):
             step = Transition(before, command[k], after, old, old, last)
             memories.append(self.next_memory(step))
         return {name: np.stack([m[name] for m in memories]) for name in memory}
+
+
+ELEMENTS = {"obstacles": (3, 5), "reward_regions": (4,), "drag_regions": (4,)}
+"""Options that are lists of elements of the scene, and how many numbers an element
+has."""
+
+
+def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
+    """Return the elements of an option as tuples; refuse others than lists of them."""
+    try:
+        found = tuple(tuple(float(x) for x in element) for element in value)
+    except (TypeError, ValueError):
+        found = ((),)
+    for k, element in enumerate(found):
+        if len(element) not in sizes or not np.isfinite(element).all():
+            words = " or ".join(map(str, sizes))
+            raise ValueError(f"{name}: {value!r} must be lists of {words} numbers")
+        if element[2] <= 0 or (name == "drag_regions" and element[3] < 0):
+            raise ValueError(f"{name}: element {k}, {element}, has a number below 0")
+    return found
+
+
+def _sums(points: Array, regions: tuple[tuple[float, ...], ...]) -> Array:
+    """(..., n) sums of the last numbers of the regions that have points (..., n, 2)."""
+    total = np.zeros_like(points[..., 0])
+    for x, y, radius, value in regions:
+        total = total + value * (length(points - np.array([x, y])) < radius)
+    return total
 
 
 def _check_number(name: str, kind: object, value: object) -> None:

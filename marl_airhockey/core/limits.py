@@ -2,7 +2,8 @@
 
 A commanded velocity is within the top speed, within the acceleration of the one before,
 and, toward an edge of the reach, no higher than a paddle can still brake from in front
-of it, so that no position is ever clipped.
+of it, so that no position is ever clipped. An obstacle is an edge across the way to its
+nearest point: what stays behind that edge does not meet the obstacle, which is convex.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def limits_stage(
         after: result, filled by the stage.
     """
     shared = (reach.normals, reach.offsets, reach.share, reach.rotation)
-    fixed = map(Fixed, shared)
+    fixed = map(Fixed, (*shared, reach.obstacles))
     arguments = (action, prescribed, *before, *fixed, reach.passes, *top, dt, *after)
     return Stage(_limit, arguments, stops=True)
 
@@ -93,6 +94,7 @@ def _limit(
     offsets: Array,
     share: Array,
     rotation: Array,
+    obstacles: Array,
     passes: int,
     top_speed: Array,
     top_acceleration: Array,
@@ -103,15 +105,17 @@ def _limit(
 ) -> bool:
     """Fill the result for each seat of each world; False at an infinite action."""
     edges, rate = normals.shape[1], 1.0 / dt
-    # Edges that are close, and the highest speed toward each.
-    close, fastest = np.empty(edges, np.int64), np.empty(edges)
+    # Normals of the edges that are close, and the highest speed toward each.
+    most_edges = edges + len(obstacles)
+    close_x, close_y = np.empty(most_edges), np.empty(most_edges)
+    fastest = np.empty(most_edges)
 
     # Inner function: a call with arrays would cost more than the arithmetic.
-    def inside(s: int, count: int, x: float, y: float) -> tuple[float, float]:
+    def inside(count: int, x: float, y: float) -> tuple[float, float]:
         """Remove the part of a velocity that is too fast toward the close edges."""
         for _ in range(passes):
             for i in range(count):
-                nx, ny = normals[s, close[i], 0], normals[s, close[i], 1]
+                nx, ny = close_x[i], close_y[i]
                 # Without a branch, which would be guessed wrong too often.
                 over = max(-(nx * x + ny * y) - fastest[i], 0.0)
                 x, y = x + over * nx, y + over * ny
@@ -143,21 +147,26 @@ def _limit(
             inverse = 1.0 / planned
             ample = top * (0.5 * top * inverse + dt)
             px, py, count = position[b, s, 0], position[b, s, 1], 0
-            for k in range(edges):
-                nx, ny = normals[s, k, 0], normals[s, k, 1]
+            for k in range(most_edges):
+                if k < edges:
+                    nx, ny = normals[s, k, 0], normals[s, k, 1]
+                    room = nx * px + ny * py + offsets[s, k]
+                else:
+                    nx, ny, room = away(obstacles[k - edges], px, py)
                 closing = -(nx * vx + ny * vy)
-                room = nx * px + ny * py + offsets[s, k] - 0.5 * dt * closing
+                room -= 0.5 * dt * closing
                 if room >= ample:
                     continue
                 stop = np.sqrt(dt * dt + 2.0 * max(room, 0.0) * inverse)
                 h = planned * (stop - dt)
-                close[count], fastest[count] = k, max(h, closing - planned * dt)
+                close_x[count], close_y[count] = nx, ny
+                fastest[count] = max(h, closing - planned * dt)
                 count += 1
-            sx, sy = inside(s, count, wx, wy)
+            sx, sy = inside(count, wx, wy)
             if count and (sx - vx) ** 2 + (sy - vy) ** 2 > most * most:
                 # Interpolate toward pure braking until the change is allowed. Both ends
                 # lie inside the (convex) bounds of the edges, so all between does.
-                bx, by = inside(s, count, vx, vy)
+                bx, by = inside(count, vx, vy)
                 share_of_way = _within(sx - bx, sy - by, bx - vx, by - vy, most)
                 sx, sy = bx + share_of_way * (sx - bx), by + share_of_way * (sy - by)
             held = np.sqrt((wx - sx) ** 2 + (wy - sy) ** 2) if count else 0.0
@@ -179,6 +188,25 @@ def _limit(
             cost = (fast + held) / top + (hard + jerky / JERK) / hardest
             violation[b, s, 4] = cost
     return True
+
+
+@compiled(error_model="numpy")
+def away(obstacle: Array, x: float, y: float) -> tuple[float, float, float]:
+    """Return the unit vector from an obstacle to a centre, and its room, m.
+
+    Args:
+        obstacle: (5,) both ends and the distance that centres keep, m.
+        x: of the centre, m.
+        y: likewise.
+    """
+    ax, ay = obstacle[2] - obstacle[0], obstacle[3] - obstacle[1]
+    along = (x - obstacle[0]) * ax + (y - obstacle[1]) * ay
+    share = min(max(along / max(ax * ax + ay * ay, 1e-12), 0.0), 1.0)
+    nx, ny = x - obstacle[0] - share * ax, y - obstacle[1] - share * ay
+    gap = np.sqrt(nx * nx + ny * ny)
+    if gap < 1e-9:
+        return 1.0, 0.0, -obstacle[4]
+    return nx / gap, ny / gap, gap - obstacle[4]
 
 
 @compiled(error_model="numpy")

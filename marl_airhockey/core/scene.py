@@ -10,7 +10,7 @@ import numpy as np
 
 from marl_airhockey.core.seat import Seat
 from marl_airhockey.core.state import Bodies, State
-from marl_airhockey.core.table import Table
+from marl_airhockey.core.table import Obstacle, Table
 from marl_airhockey.types import Array
 
 
@@ -29,15 +29,6 @@ class GoalLine:
 
 
 @dataclass(frozen=True)
-class Obstacle:
-    """Obstacle: a static disc, or a rounded segment if ``end`` is given; metres."""
-
-    start: tuple[float, float]
-    radius: float
-    end: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
 class Scene:
     """Seats, bodies and goal lines of a scenario on its table.
 
@@ -52,7 +43,6 @@ class Scene:
     block_radius: float = 0.0377
     """Radius of a disc, or half the side of a square (m)."""
     block_shape: Literal["disc", "square"] = "disc"
-    obstacles: tuple[Obstacle, ...] = ()
     goal_lines: tuple[GoalLine, ...] = ()
     path: bool = False
     """True if the scenario needs positions at every substep."""
@@ -96,6 +86,11 @@ class Scene:
         )
         counts = (self.pucks, self.blocks, len(self.obstacles))
         return Bodies(len(self.seats), *counts, radius)
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Obstacles on the table."""
+        return self.table.obstacles
 
     def goal_line(self, name: str) -> int:
         """Return the index of the goal line with this name."""

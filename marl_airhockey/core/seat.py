@@ -89,6 +89,12 @@ def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
     return normals, offsets
 
 
+OBSTACLE_MARGIN = 5e-4
+"""Gap that paddles keep to obstacles, whose edge turns along a curved way (m)."""
+OBSTACLE_SHARE = 0.5
+"""Share of the acceleration that may be planned against one of edges and obstacles."""
+
+
 @dataclass(frozen=True)
 class ReachPlanes:
     """Reaches of S seats as half-planes of the table frame."""
@@ -102,8 +108,11 @@ class ReachPlanes:
     braking against both edges of a corner together stays within the limit"""
     rotation: Array
     """Rotations from the table frame to each seat's ego frame (S, 2, 2)"""
+    obstacles: Array
+    """Obstacles (O, 5): both ends, m, and the distance that centres keep, m"""
     passes: int
-    """Number of projections: more than one if any corner is sharper than 90 degrees"""
+    """Number of projections: more than one if any corner is sharper than 90 degrees, or
+    if there are obstacles"""
 
     @staticmethod
     def of(table: Table, seats: tuple[Seat, ...]) -> ReachPlanes:
@@ -116,5 +125,12 @@ class ReachPlanes:
             share[s] = np.sqrt((1 + cosine) / 2)
             sharpest = min(sharpest, cosine)
         rotation = np.array([table.rotation(seat.side) for seat in seats])
-        passes = 1 if sharpest > -1e-9 else 12
-        return ReachPlanes(normals, offsets, share, rotation, passes)
+        near = table.paddle_radius + OBSTACLE_MARGIN
+        rows = [
+            (*o.start, *(o.end or o.start), o.radius + near) for o in table.obstacles
+        ]
+        obstacles = np.array(rows, float).reshape(-1, 5)
+        # Braking against an obstacle and an edge is planned as in a corner.
+        share = np.minimum(share, OBSTACLE_SHARE) if rows else share
+        passes = 1 if sharpest > -1e-9 and not rows else 12
+        return ReachPlanes(normals, offsets, share, rotation, obstacles, passes)

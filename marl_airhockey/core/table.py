@@ -35,6 +35,15 @@ WIDE = (
 
 
 @dataclass(frozen=True)
+class Obstacle:
+    """Obstacle: a static disc, or a rounded segment if ``end`` is given; metres."""
+
+    start: tuple[float, float]
+    radius: float
+    end: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
 class Table:
     """Convex playing surface; `TABLES` holds presets.
 
@@ -51,6 +60,7 @@ class Table:
     """Radius of a puck (m; 2.5 in diameter)."""
     robot_reach: tuple[tuple[float, float], ...] = BOX
     """Convex polygon that a UR5e at a side holds: x from the side, y, m."""
+    obstacles: tuple[Obstacle, ...] = ()
     physics: dict[str, float] = field(default_factory=dict, hash=False)
     """Physical parameters that come with this table, by name."""
 

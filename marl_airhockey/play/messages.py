@@ -42,7 +42,7 @@ def drawn(
         "angles": rounded(state.angle[state.bodies.block]),
         "marks": [
             [m.kind, *rounded(np.array([*m.start, *m.end, m.radius]))]
-            for m in scenario.marks(state, memory)
+            for m in scenario.all_marks(state, memory)
         ],
         "caption": scenario.caption(memory),
         "returns": rounded(returns),

@@ -46,7 +46,7 @@ def write_recording_video(
         frame = Frame(
             scene=scenario.scene,
             state=state,
-            marks=scenario.marks(state, memory),
+            marks=scenario.all_marks(state, memory),
             trails=[[(x, y) for x, y in trail] for trail in np.swapaxes(trails, 0, 1)],
             title=scenario.name.replace("_", " "),
             note=f"{scenario.caption(memory)}   {float(state.time):4.1f} s",

@@ -9,10 +9,10 @@ from marl_airhockey.contracts.scenario import GoalScenario, Scenario, Transition
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.geometry import clip, length
 from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
+from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import Seat
 from marl_airhockey.core.state import State
-from marl_airhockey.core.table import Table
+from marl_airhockey.core.table import Obstacle, Table
 from marl_airhockey.types import Array, Memory
 
 __all__ = [

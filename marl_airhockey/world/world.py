@@ -32,6 +32,7 @@ from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
+from marl_airhockey.world.elements import DragRegions, clear_start
 from marl_airhockey.world.episode import Episode, PhysicsRows
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.referee import Referee
@@ -98,6 +99,7 @@ class World:
         self._sensed = self._known = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
+        self._drag = DragRegions(scenario, b) if scenario.drag_regions else None
         self.start_spread = 1.0
         """Share of the ranges, about their middles, from which episodes start"""
         self.closed = False
@@ -268,10 +270,12 @@ class World:
         if len(changed):
             self.backend.set_physics(self._episode.physics, changed)
         self._key_scatter(worlds)
+        if self._drag is not None:
+            self._drag.forget(worlds)
         rng = self._streams.of("start", worlds)
         rng.spread = self.start_spread
         if rows is None:
-            rows, memory = self.scenario.reset(rng, len(worlds))
+            rows, memory = clear_start(self.scenario, rng, len(worlds))
         else:
             memory = self.scenario.initial_memory(rows, rng)
         self._begin(worlds, rows, self._aimed(rng, rows, memory, worlds))
@@ -390,6 +394,8 @@ class World:
         step, now = self._built, (self._sensed, self._known_memory, self._episode)
         self._requested = self._actions.collect(actions, prescribed, *now)
         self.sensor.note(self._requested)
+        if self._drag is not None:
+            self._drag.update(self.backend, self._state, self._episode.physics)
         moment = step()
         self._adopt(moment)
         result = StepResult.of(moment, self.open if self.driven else None)

@@ -1,5 +1,7 @@
 """One world of a backend with bodies where a test wants them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from marl_airhockey.contracts.backend import Command
@@ -19,7 +21,10 @@ FLAT = {name: p.default for name, p in PARAMETERS.items()} | {
 
 
 class Bench:
-    def __init__(self, backend, physics=None, pucks=1, table=TABLE, **scene):
+    def __init__(
+        self, backend, physics=None, pucks=1, table=TABLE, obstacles=(), **scene
+    ):
+        table = replace(table, obstacles=obstacles)
         self.scene = Scene(table, (make_seat("robot", table, 0),), pucks=pucks, **scene)
         kind = find_backend(backend)
         self.refused = kind.supports(self.scene)

@@ -11,9 +11,9 @@ from pair import Pair
 import marl_airhockey as ah
 from marl_airhockey.contracts.backend import Command
 from marl_airhockey.core.parameters import PARAMETERS, PUCK_SPEED_CAP
-from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
+from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import GRAVITY, Table
+from marl_airhockey.core.table import GRAVITY, Obstacle, Table
 from marl_airhockey.registry import find_backend
 from marl_airhockey.toolkit.starts import roll
 

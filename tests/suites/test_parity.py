@@ -4,14 +4,16 @@ A backend with substeps finds a contact late, so that its normal and place are o
 what moves in one: where contacts are compared, pymunk takes fine ones.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from marl_airhockey.contracts.backend import Command
 from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.scene import GoalLine, Obstacle, Scene
+from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES, Table
+from marl_airhockey.core.table import TABLES, Obstacle, Table
 from marl_airhockey.registry import find_backend
 
 TABLE = TABLES["standard"]
@@ -51,8 +53,9 @@ def bodies(worlds, *others):
     return rows
 
 
-def table_with(**options):
-    return Scene(TABLE, (make_seat("robot", TABLE, 0),), **{"pucks": 1} | options)
+def table_with(obstacles=(), **options):
+    table = replace(TABLE, obstacles=obstacles)
+    return Scene(table, (make_seat("robot", table, 0),), **{"pucks": 1} | options)
 
 
 def same_outcome(pymunk, numba, share=0.02, least=0.05, most=1):
