@@ -89,8 +89,8 @@ def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
     return normals, offsets
 
 
-OBSTACLE_MARGIN = 5e-4
-"""Gap that paddles keep to obstacles, whose edge turns along a curved way (m)."""
+OBSTACLE_MARGIN = 1e-3
+"""Gap that paddles keep to obstacles; braking in a wedge takes up to half of it (m)."""
 OBSTACLE_SHARE = 0.5
 """Share of the acceleration that may be planned against one of edges and obstacles."""
 

@@ -213,22 +213,24 @@ class Touched(Observable):
 class Goal(Observable):
     """Goal position, and the vector to it from the own paddle or from puck 0.
 
-    ``memory["goal"]`` is (..., 2) in the table frame.
+    The array of the memory is (..., 2) in the table frame.
     """
 
     unit: tuple[float, float]
     x: float
     origin: str
     """Body that is to reach the goal: "own" or "puck"."""
+    name: str = "goal"
+    """Name in the memory."""
     goal = True
 
     def columns(self, scope: ObservationContext) -> list[Column]:
-        return scope.position_columns("goal", self.unit, self.x) + scope.offset_columns(
-            f"{self.origin}_to_goal", self.unit
-        )
+        where = scope.position_columns(self.name, self.unit, self.x)
+        way = scope.offset_columns(f"{self.origin}_to_{self.name}", self.unit)
+        return where + way
 
     def write(self, ego: EgoView, out: Array) -> None:
-        goal = ego.rotate(ego.kept("goal")[..., None, :])[..., 0, :]
+        goal = ego.rotate(ego.kept(self.name)[..., None, :])[..., 0, :]
         out[..., :2] = goal
         out[..., 2:] = goal - (ego.own if self.origin == "own" else ego.puck[..., 0, :])
 

@@ -1,0 +1,123 @@
+"""Pass through several goals, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey.toolkit import (
+    Array,
+    Mark,
+    Memory,
+    RandomStreams,
+    Scenario,
+    Scene,
+    State,
+    Transition,
+    length,
+    observables,
+    starts,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachSequence(Scenario):
+    """Task that rewards progress toward the goal in turn and, once each, its passage.
+
+    Observed are the goal in turn and the one after it, so that a way through both can
+    be planned; the last one is also the one after itself. Time costs.
+    """
+
+    seconds: float = 6.0
+    count: int = 5
+    """Number of goals."""
+    radius: float = 0.03
+    """Distance that counts as passage (m)."""
+    far: float = 0.12
+    """Shortest distance of a goal from the one before, or from the paddle (m)."""
+
+    @cached_property
+    def scene(self) -> Scene:
+        return Scene(self.table_geometry, (self.seat(),))
+
+    def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
+        state = starts.falling(rng, self.scene)
+        return state, self.initial_memory(state, rng)
+
+    def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
+        last, goals = state.paddle[:, 0], []
+        for _ in range(self.count):
+
+            def apart(rows: Array, last: Array = last) -> Array:
+                return np.asarray(length(rows - last) >= self.far)
+
+            last = starts.redraw(
+                rng, lambda some: starts.inside(some, self.scene, 0), apart
+            )
+            goals.append(last)
+        every = np.stack(goals, 1)
+        return {
+            **super().initial_memory(state, rng),
+            "goals": every,
+            "passed": np.zeros(len(rng)),
+            "goal": every[:, 0].copy(),
+            "next_goal": every[:, min(1, self.count - 1)].copy(),
+            "gap": length(state.paddle[:, 0] - every[:, 0]),
+        }
+
+    def update_memory(self, t: Transition) -> Memory:
+        own, old = t.after.paddle[..., 0, :], t.memory
+        passes = length(own - old["goal"]) < self.radius
+        passed = old["passed"] + passes
+        goal, following = (self._goal(old, passed + k) for k in (0, 1))
+        return {
+            "passed": passed,
+            "goal": goal,
+            "next_goal": following,
+            "gap": length(own - goal),
+        }
+
+    def _goal(self, memory: Memory, turn: Array) -> Array:
+        """(..., 2) goal of a turn; the last one beyond it."""
+        turn = np.minimum(turn, self.count - 1.0)[..., None]
+        mine = turn == np.arange(self.count)
+        return np.asarray((memory["goals"] * mine[..., None]).sum(-2))
+
+    observation = (
+        observables.OwnPaddle(),
+        observables.Goal((0.2, 0.2), -0.55, "own"),
+        observables.Goal((0.2, 0.2), -0.55, "own", "next_goal"),
+    )
+
+    def reward_terms(self, t: Transition) -> dict[str, Array]:
+        """Return the terms.
+
+        progress: 2 times the metres by which the gap to the goal in turn shrank.
+        passage: 1 for each goal.
+        time: -0.02 a step.
+        """
+        gap = length(t.after.paddle[..., 0, :] - t.memory["goal"])
+        return {
+            "progress": 2.0 * (t.memory["gap"] - gap)[..., None],
+            "passage": (t.new_memory["passed"] - t.memory["passed"])[..., None],
+            "time": np.full((*t.after.time.shape, 1), -0.02),
+        }
+
+    def terminated(self, t: Transition) -> Array:
+        return self.success(t)
+
+    def success(self, t: Transition) -> Array:
+        """(...) bool: the paddle has been at all goals in turn."""
+        return np.asarray(t.new_memory["passed"] >= self.count)
+
+    def marks(self, state: State, memory: Memory) -> list[Mark]:
+        left = memory["goals"][int(memory["passed"]) :]
+        return [Mark.circle(goal, self.radius) for goal in left]
+
+    def caption(self, memory: Memory) -> str:
+        return f"goal {int(memory['passed'])} of {self.count}"
+
+
+make = ReachSequence
