@@ -1,7 +1,10 @@
-"""SAC with hindsight goals, with terminations of the new and of the former goals.
+"""SAC with hindsight goals in the four tasks with goals, and two variants of it.
 
-    python scripts/reproduce/hindsight.py --tasks reach,reach_velocity --seeds 1
+    python scripts/reproduce/hindsight.py --tasks reach --variants recorded,relabelled
+    python scripts/reproduce/hindsight.py --variants relabelled,tqc
 
+Variants: relabelled (the default), recorded (terminations of the former goals), tqc
+(critics of quantiles, with relabelled terminations).
 A run that ends adds a row to ``docs/data/hindsight.csv``: success of the last policy
 over 500 test seeds, steps, CPU-minutes, and the first evaluation with a success of 0.9.
 A run whose row is there is not trained again, and one that was cut off resumes.
@@ -17,7 +20,7 @@ from typing import Annotated, Any
 import typer
 
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.learn.hindsight.config import CHOICES, hindsight_config
+from marl_airhockey.learn.hindsight.config import hindsight_config
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 
@@ -28,18 +31,24 @@ STEPS = {
     "hit_goal_velocity": 300_000,
 }
 """Steps of worlds by task"""
+VARIANTS: dict[str, dict[str, Any]] = {
+    "recorded": {"ends": "recorded"},
+    "relabelled": {},
+    "tqc": {"critics": "quantiles"},
+}
+"""Settings by the name of a variant"""
 ROWS = Path(__file__).parents[2] / "docs" / "data" / "hindsight.csv"
-KEY = ("task", "ends", "seed")
+KEY = ("task", "variant", "seed")
 EPISODES = 500
 Row = dict[str, Any]
 
 
-def train_run(task: str, ends: str, seed: int, folder: Path) -> Row:
+def train_run(task: str, variant: str, seed: int, folder: Path) -> Row:
     """Train one run and return its row."""
     steps = STEPS[task]
-    changes = {"total_steps": steps, "ends": ends, "seed": seed, "evaluations": 12}
-    config = hindsight_config(task, changes)
-    place = folder / f"{task}-{ends}-{seed}"
+    changes = {"total_steps": steps, "seed": seed, "evaluations": 12}
+    config = hindsight_config(task, {**changes, **VARIANTS[variant]})
+    place = folder / f"{task}-{variant}-{seed}"
     row = run_training(None if (place / "config.toml").exists() else config, place)
     policy = load_policy(place / "last.npz")
     found = evaluate(
@@ -51,7 +60,7 @@ def train_run(task: str, ends: str, seed: int, folder: Path) -> Row:
         if float(each["success"]) >= 0.9
     ]
     return {
-        **dict(zip(KEY, (task, ends, seed), strict=True)),
+        **dict(zip(KEY, (task, variant, seed), strict=True)),
         "success": round(found.success, 4),
         "steps": int(row["steps"]),
         "cpu_minutes": round(row["learning_cpu_seconds"] / 60, 1),
@@ -70,7 +79,7 @@ def read(path: Path) -> list[Row]:
 def keep(row: Row) -> None:
     """Add a row to those there are, in order."""
     rows = [*read(ROWS), {name: str(value) for name, value in row.items()}]
-    rows.sort(key=lambda r: (list(STEPS).index(r["task"]), r["ends"], r["seed"]))
+    rows.sort(key=lambda r: (list(STEPS).index(r["task"]), r["variant"], r["seed"]))
     with ROWS.open("w", newline="") as file:
         writer = csv.DictWriter(file, list(row), lineterminator="\n")
         writer.writeheader()
@@ -79,6 +88,9 @@ def keep(row: Row) -> None:
 
 def main(
     tasks: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(STEPS),
+    variants: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(
+        VARIANTS
+    ),
     seeds: Annotated[int, typer.Option(help="Runs of each kind.")] = 1,
     jobs: Annotated[int, typer.Option(help="Runs at a time.")] = 2,
     folder: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
@@ -88,11 +100,11 @@ def main(
     """Train what has no row yet."""
     known = {tuple(row[name] for name in KEY) for row in read(ROWS)}
     wanted = [
-        (task, ends, seed)
+        (task, variant, seed)
         for seed in range(seeds)
         for task in tasks.split(",")
-        for ends in CHOICES["ends"]
-        if (task, ends, str(seed)) not in known
+        for variant in variants.split(",")
+        if (task, variant, str(seed)) not in known
     ]
     with ProcessPoolExecutor(jobs) as pool:
         runs = [pool.submit(train_run, *run, folder) for run in wanted]
