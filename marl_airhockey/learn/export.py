@@ -10,12 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import require
+from marl_airhockey.data.files import shown_name
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.learn.ppo_config import PPOConfig, preset
+from marl_airhockey.learn.algorithms import (
+    PPO,
+    AnyConfig,
+    load_any_config,
+    make_config,
+)
+from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import Progress
-from marl_airhockey.learn.settings import load_config
+from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.registry import find_scenario, make_agent
@@ -43,7 +51,7 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
         raise ValueError(f"out: {out} must end in .npz or .onnx")
     if out.suffix == ".onnx":
         require("onnx", "offline")
-    config = load_config(PPOConfig, run / "config.toml")
+    config = load_any_config(run)
     if not (run / "state.json").exists():
         raise ValueError(f"{run}: there is no policy in it yet; train it first")
     progress = Progress.load(run / "state.json")
@@ -51,7 +59,10 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
     steps = last.card["steps"] if checkpoint else progress.steps
     minutes = progress.cpu_seconds / 60 * steps / progress.steps
     policy = policy_driver(last, str(checkpoint or run))
-    metrics = _games(policy, config) if config.self_play else _episodes(policy, config)
+    if isinstance(config, PPOConfig) and config.self_play:
+        metrics = _games(policy, config)
+    else:
+        metrics = _episodes(policy, config)
     card = {
         **last.card,
         "version": find_scenario(config.scenario).version,
@@ -81,7 +92,7 @@ def _load_last(run: Path) -> NumpyPolicy:
     return NumpyPolicy.load(run / "last.npz")
 
 
-def _episodes(policy: Policy, config: PPOConfig) -> dict[str, Any]:
+def _episodes(policy: Policy, config: RunConfig) -> dict[str, Any]:
     result = evaluate(
         policy,
         config.scenario,
@@ -113,16 +124,27 @@ def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
     }
 
 
-def training_command(config: PPOConfig) -> str:
-    """Return the command line that trains a configuration anew."""
-    defaults = preset(config.scenario, {"profile": config.profile, "seed": config.seed})
+def training_command(config: AnyConfig) -> str:
+    """Return the command line that trains a configuration anew.
+
+    Recordings are named by their folders, and data of a named dataset by its name.
+    """
+    algo = PPO if isinstance(config, PPOConfig) else config.algo
+    data = config.data if isinstance(config, OfflineConfig) else []
+    usual = {"profile": config.profile, "seed": config.seed}
+    defaults = make_config(algo, config.scenario, data, usual)
     words = [f"airhockey train {config.scenario} --seed {config.seed}"]
+    if algo != PPO:
+        words.append(f"--algo {algo}")
+    folders = (shown_name(Path(path)) for path in data)
+    shown = [Path(name).name if Path(name).is_absolute() else name for name in folders]
+    words += [f"--data {name}" for name in shown]
     if config.profile != "ideal":
         words.append(f"--profile {config.profile}")
     words += [f"--option {k}={v}" for k, v in config.options.items()]
     words += [f"--driver {k}={v}" for k, v in config.drivers.items()]
-    named = {"scenario", "profile", "options", "drivers", "seed"}
-    if not config.self_play:
+    named = {"scenario", "profile", "options", "drivers", "seed", "algo", "data"}
+    if isinstance(config, PPOConfig) and not config.self_play:
         named |= {*config.SELF_PLAY}
     for f in fields(config):
         value = getattr(config, f.name)

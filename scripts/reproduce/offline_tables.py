@@ -2,10 +2,12 @@
 
     python scripts/reproduce/offline_tables.py
     python scripts/reproduce/offline_tables.py --plot docs/images/table.png
+    python scripts/reproduce/offline_tables.py --domain paper --plot like_for_like.png
 
-RL is that of ``reproduce/tasks.py`` (columns success and arm of ``tasks.csv``) and, in
-the lab, of ``bench/lab_tasks.py``; chance is the success of random actions. The paper's
-figures (arXiv 2405.03113) are of its own rules, physics and data.
+RL is that of ``reproduce/tasks.py`` (columns success and arm of ``tasks.csv``), in the
+lab of ``bench/lab_tasks.py``, and under the paper's rules of rows of its own; chance is
+the success of random actions. The paper's figures (arXiv 2405.03113) are of its own
+rules, physics and data.
 """
 
 from __future__ import annotations
@@ -53,6 +55,7 @@ PAPER: dict[str, dict[str, Paper]] = {
     },
 }
 """Success of BC, IQL and RL in the paper by domain and task; None without a figure"""
+PAPER["paper"] = PAPER["2d"]
 COLUMNS = {"2d": ("success", 2000), "robosuite": ("arm", 200)}
 """Column of ``tasks.csv`` with the success of RL, and its episodes of each seed"""
 ALGOS = ("bc", "bc10", "td3_bc", "iql", "rebrac")
@@ -76,8 +79,18 @@ def success_of(rows: list[Row], *cell: str) -> tuple[float, int] | None:
     return mean, sum(int(row["episodes"]) for row in own)
 
 
-def rl_of(domain: str, task: str) -> tuple[float, int] | None:
+def chance_of(domain: str, task: str, rows: list[Row]) -> float:
+    """Return the success of random actions."""
+    if domain == "paper":
+        found = success_of(rows, domain, EXPERT, task, "random")
+        return found[0] if found else float("nan")
+    return published()[f"airhockey/{task}/random-v0"].success
+
+
+def rl_of(domain: str, task: str, rows: list[Row]) -> tuple[float, int] | None:
     """Return the mean success of RL, and its episodes."""
+    if domain == "paper":
+        return success_of(rows, domain, EXPERT, task, "rl")
     if domain == "lab":
         found = [row for row in read("lab_tasks.csv") if row["task"] == task]
         return float(found[0]["lab"].split()[0]), 20
@@ -104,8 +117,8 @@ def table_of(domain: str, rows: list[Row]) -> list[list[str]]:
     for task, paper in PAPER[domain].items():
         cells = [success_of(rows, domain, EXPERT, task, a) for a in ("bc", "iql")]
         figures = ", ".join("-" if x is None else f"{x:.1f}" for x in paper)
-        chance = f"{published()[f'airhockey/{task}/random-v0'].success:.2f}"
-        each = map(shown, (*cells, rl_of(domain, task)))
+        chance = f"{chance_of(domain, task, rows):.2f}"
+        each = map(shown, (*cells, rl_of(domain, task, rows)))
         found.append([task, chance, *each, figures])
     return found
 
@@ -132,27 +145,27 @@ def tables_of(rows: list[Row]) -> dict[str, list[list[str]]]:
     }
 
 
-def plot(rows: list[Row], path: Path) -> None:
-    """Draw our success in 2d as bars, the paper's as marks, chance as lines."""
+def plot(rows: list[Row], path: Path, domain: str) -> None:
+    """Draw our success as bars, the paper's as marks, chance as lines."""
     import matplotlib.pyplot as plt
 
-    tasks, width = list(PAPER["2d"]), 0.26
+    tasks, width = list(PAPER[domain]), 0.26
     figure, axes = plt.subplots(figsize=(10, 3.6), layout="constrained")
     for k, name in enumerate(("bc", "iql", "rl")):
         ours = [
-            rl_of("2d", task)
+            rl_of(domain, task, rows)
             if name == "rl"
-            else success_of(rows, "2d", EXPERT, task, name)
+            else success_of(rows, domain, EXPERT, task, name)
             for task in tasks
         ]
         at = np.arange(len(tasks)) + (k - 1) * width
         heights = [found[0] if found else 0.0 for found in ours]
         axes.bar(at, heights, 0.9 * width, label=f"{name.upper()}, ours")
-        theirs = [PAPER["2d"][task][k] or 0.0 for task in tasks]
+        theirs = [PAPER[domain][task][k] or 0.0 for task in tasks]
         label = "the paper" if k == 2 else "_"
         axes.plot(at, theirs, "k_", markersize=11, markeredgewidth=2, label=label)
     for k, task in enumerate(tasks):
-        chance = published()[f"airhockey/{task}/random-v0"].success
+        chance = chance_of(domain, task, rows)
         label = "chance" if k == 0 else "_"
         axes.hlines(chance, k - 0.45, k + 0.45, "grey", "dotted", label=label)
     axes.set_xticks(range(len(tasks)), [t.replace("_", "\n") for t in tasks])
@@ -165,11 +178,12 @@ def main(
     picture: Annotated[
         Path | None, typer.Option("--plot", help="Picture to write, PNG.")
     ] = None,
+    domain: Annotated[str, typer.Option(help="Of the picture.")] = "2d",
 ) -> None:
     """Print the tables in Markdown, or draw the picture."""
     rows = read("offline.csv")
     if picture is not None:
-        plot(rows, picture)
+        plot(rows, picture, domain)
         return
     for title, (header, *lines) in tables_of(rows).items():
         print(f"\n{title}\n")

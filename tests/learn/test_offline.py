@@ -11,6 +11,7 @@ from marl_airhockey.data.files import recordings_in
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.learn.export import export_policy
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.train import load_any_config, run_training
@@ -120,6 +121,10 @@ def test_a_run_that_was_cut_off_goes_on(expert, tmp_path):
     assert row["steps"] == SMALL["total_steps"]
     assert len((tmp_path / "evaluations.csv").read_text().splitlines()) > begun
     assert run_training(None, tmp_path) == row, "there is nothing left to do"
+    card = export_policy(tmp_path, tmp_path / "reach.npz").card
+    given = f"airhockey train reach --seed 0 --algo iql --data {expert.name} "
+    assert card["command"].startswith(given)
+    assert ah.load_policy(tmp_path / "reach.npz").trained_in["scenario"] == "reach"
 
 
 @pytest.mark.parametrize(
