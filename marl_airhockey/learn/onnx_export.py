@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -16,48 +18,72 @@ OPSET = 17
 """Version of the operators, which runtimes from 2022 on know"""
 
 
+class Graph:
+    """Graph of operations on the input ``observation``."""
+
+    def __init__(self) -> None:
+        self._nodes: list[onnx.NodeProto] = []
+        self._constants: list[onnx.TensorProto] = []
+
+    def constant(self, name: str, value: object) -> str:
+        """Add a constant array; return its name."""
+        array = np.asarray(value, np.float32)
+        self._constants.append(numpy_helper.from_array(array, name))
+        return name
+
+    def node(self, kind: str, *inputs: str, **attributes: Any) -> str:
+        """Add an operation on values; return the name of its result."""
+        name = f"value_{len(self._nodes)}"
+        node = helper.make_node(kind, list(inputs), [name], **attributes)
+        self._nodes.append(node)
+        return name
+
+    def save(
+        self, last: str, shape: tuple[int, ...], card: Mapping[str, Any], path: Path
+    ) -> None:
+        """Write the model of a policy; the file is replaced atomically.
+
+        Args:
+            last: Name of the value that is its action before it is clipped.
+            shape: Shape of an observation.
+            card: Card of the policy.
+            path: Path of the file.
+        """
+        bounds = self.constant("low", -1.0), self.constant("high", 1.0)
+        self._nodes.append(helper.make_node("Clip", [last, *bounds], ["action"]))
+        given, made = (
+            helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", *sizes])
+            for name, sizes in (("observation", shape), ("action", (2,)))
+        )
+        graph = helper.make_graph(
+            self._nodes, "policy", [given], [made], self._constants
+        )
+        model = helper.make_model(
+            graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8
+        )
+        helper.set_model_props(model, {ONNX_CARD: json.dumps(dict(card))})
+        onnx.checker.check_model(model)
+        draft = path.with_name(f"part-{path.name}")
+        draft.write_bytes(model.SerializeToString())
+        draft.replace(path)
+
+
 def save_onnx(policy: NumpyPolicy, path: Path) -> None:
-    """Write a policy as an ONNX model; the file is replaced atomically.
+    """Write a policy as an ONNX model.
 
     Its input ``observation`` is (B, D) float32, goals that are given apart after the
     rest; its output ``action`` is (B, 2) float32, the mean action within -1 .. 1.
     The policy's card is the model's metadata ``card``, as JSON.
     """
-    nodes: list[onnx.NodeProto] = []
-    constants: list[onnx.TensorProto] = []
-
-    def constant(name: str, value: object) -> str:
-        array = np.asarray(value, np.float32)
-        constants.append(numpy_helper.from_array(array, name))
-        return name
-
-    def node(kind: str, *inputs: str) -> str:
-        name = f"value_{len(nodes)}"
-        nodes.append(helper.make_node(kind, list(inputs), [name]))
-        return name
-
-    x = node("Sub", "observation", constant("centre", policy.centre))
-    x = node("Div", x, constant("unit", policy.unit))
+    graph = Graph()
+    x = graph.node("Sub", "observation", graph.constant("centre", policy.centre))
+    x = graph.node("Div", x, graph.constant("unit", policy.unit))
     for i, (weight, bias) in enumerate(policy.layers):
         if i:
-            x = node("Relu", x)
-        arrays = constant(f"weight_{i}", weight.T), constant(f"bias_{i}", bias)
-        x = node("Gemm", x, *arrays)
+            x = graph.node("Relu", x)
+        arrays = weight.T, bias
+        names = f"weight_{i}", f"bias_{i}"
+        x = graph.node("Gemm", x, *map(graph.constant, names, arrays))
     if policy.card.get("bounded"):
-        x = node("Tanh", x)
-    bounds = constant("low", -1.0), constant("high", 1.0)
-    nodes.append(helper.make_node("Clip", [x, *bounds], ["action"]))
-    shapes = {"observation": len(policy.centre), "action": 2}
-    given, made = (
-        helper.make_tensor_value_info(name, TensorProto.FLOAT, ["batch", size])
-        for name, size in shapes.items()
-    )
-    graph = helper.make_graph(nodes, "policy", [given], [made], constants)
-    model = helper.make_model(
-        graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=8
-    )
-    helper.set_model_props(model, {ONNX_CARD: json.dumps(dict(policy.card))})
-    onnx.checker.check_model(model)
-    draft = path.with_name(f"part-{path.name}")
-    draft.write_bytes(model.SerializeToString())
-    draft.replace(path)
+        x = graph.node("Tanh", x)
+    graph.save(x, (len(policy.centre),), policy.card, path)

@@ -145,9 +145,12 @@ def _continuation(
     if isinstance(config, OfflineConfig):
         require("torch", "train")
         require("tensorboard", "train")
-        from marl_airhockey.learn.offline.learner import train_offline
-
-        return lambda: _go_on(train_offline, TrainingRun(config, folder, report))
+        if config.observe == "pixels":
+            require("onnx", "offline")
+            from marl_airhockey.learn.offline.pixels import clone_from_pixels as learn
+        else:
+            from marl_airhockey.learn.offline.learner import train_offline as learn
+        return lambda: _go_on(learn, TrainingRun(config, folder, report))
     if isinstance(config, HindsightConfig):
         require("stable_baselines3", "train")
         from marl_airhockey.learn.hindsight.sac import train_with_hindsight

@@ -14,7 +14,7 @@ RUN_FORMAT = 2
 Raised whenever classes that a run pickles, or settings that it names, move: runs of
 another format are refused.
 """
-KINDS = ("npz", "zip")
+KINDS = ("npz", "onnx", "zip")
 """File name extensions of the policies that engines write, the safe one first."""
 
 

@@ -15,6 +15,8 @@ from marl_airhockey.learn.settings import check_names
 
 STEPS = {"bc": 20_000, "iql": 40_000, "td3_bc": 40_000, "rebrac": 40_000}
 """Gradient steps of each algorithm, unless others are given"""
+PIXEL_STEPS = 8_000
+"""The same of cloning from pixels"""
 ALGORITHMS = tuple(STEPS)
 """Names of the algorithms, which are those of their files"""
 
@@ -96,8 +98,12 @@ def offline_config(
     files = recordings_in([built(path) for path in data])
     head = shared_head(files)
     goals = {"goals": head["goals"]} if "goals" in head else {}
+    pixels = changes.get("observe") == "pixels"
+    if pixels:
+        _check_pixels(algo, head)
     for name in ("scenario", "options", "observe", "control_dt"):
-        if name in changes and changes[name] != head[name]:
+        shown = pixels and name == "observe"  # Drawn from the recorded states.
+        if name in changes and changes[name] != head[name] and not shown:
             raise ValueError(
                 f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r}"
             )
@@ -116,10 +122,22 @@ def offline_config(
         "control_dt": head["control_dt"],
         "profile": head["profile"],
         "drivers": drivers,
-        "total_steps": STEPS[algo],
+        "total_steps": STEPS[algo] if not pixels else PIXEL_STEPS,
+        "batch_size": 256 if not pixels else 64,
         "hidden": [256, 256],
         **changes,
     }
     return OfflineConfig(
         algo=algo, data=[str(path.resolve()) for path in files], **settings
     )
+
+
+def _check_pixels(algo: str, head: Mapping[str, Any]) -> None:
+    """Refuse to learn from pixels what cannot be drawn or is not cloned."""
+    if algo != "bc":
+        raise ValueError(f'observe: from "pixels" learns bc alone, not {algo}')
+    if head["profile"] != "ideal" or "goals" in head:
+        raise ValueError(
+            'observe: "pixels" are drawn from states, as they are seen in the profile '
+            "ideal with flat goals; the recordings are of others"
+        )

@@ -1,0 +1,213 @@
+"""Behaviour cloning from pixels: the same pictures as ``observe="pixels"`` shows.
+
+Recordings hold states, from which the pictures are drawn. The network is that of Mnih
+et al. (2015) with half of the channels. Its policy is an ONNX model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.observable import FRAMES
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.data.reader import episodes_of
+from marl_airhockey.learn.engine import training_threads
+from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.logs import RunLog
+from marl_airhockey.learn.offline.config import OfflineConfig
+from marl_airhockey.learn.onnx_export import Graph
+from marl_airhockey.learn.run import TrainingRun
+from marl_airhockey.policies.policy import Policy
+from marl_airhockey.registry import find_scenario
+from marl_airhockey.sensing.pixels import small_picture
+from marl_airhockey.types import Array
+from marl_airhockey.world.observer import PIXELS
+
+REPORT = 100
+"""Steps from one report of progress to the next"""
+COLUMNS = ("state.position", "memory.goal", "action")
+"""Columns that are read"""
+
+
+class Pictures(NamedTuple):
+    """Steps of one seat, with what it saw."""
+
+    frames: Tensor
+    """(M, PIXELS, PIXELS) uint8"""
+    shown: Tensor
+    """(N, FRAMES) numbers of the frames that are seen at a step, newest last"""
+    action: Tensor
+    """(N, 2), in -1 .. 1"""
+
+    def sample(self, count: int) -> tuple[Tensor, Tensor]:
+        """Return (n, PIXELS, PIXELS, FRAMES) pictures and (n, 2) actions."""
+        rows = torch.randint(len(self.action), (count,))
+        pictures = self.frames[self.shown[rows]].permute(0, 2, 3, 1)
+        return pictures, self.action[rows]
+
+
+def draw_pictures(files: Sequence[Path], scene: Scene, seat: int) -> Pictures:
+    """Draw what a seat saw in recordings.
+
+    Raises:
+        ValueError: There are no steps.
+    """
+    rotation = scene.table.rotation(scene.seats[seat].side)
+    frames: list[Array] = []
+    shown, actions = [], []
+    for path in files:
+        for episode in episodes_of(path, COLUMNS):
+            if not len(episode):
+                continue
+            before = {
+                name: np.concatenate([episode.first[name][None], episode.columns[name]])
+                for name in COLUMNS[:2]
+                if name in episode.columns
+            }
+            first, count = len(frames), len(episode)
+            for t in range(count):
+                position = before["state.position"][t]
+                goal = before["memory.goal"][t] if "memory.goal" in before else None
+                drawn = position, goal, rotation, seat, PIXELS
+                frames.append(small_picture(scene, *drawn))
+            past = np.arange(count)[:, None] + np.arange(1 - FRAMES, 1)
+            shown.append(first + np.maximum(past, 0))
+            actions.append(episode.columns["action"][:, seat])
+    if not frames:
+        raise ValueError(f"{files[0]}: there are no steps in it")
+    return Pictures(
+        torch.from_numpy(np.stack(frames)),
+        torch.from_numpy(np.concatenate(shown)),
+        torch.from_numpy(np.concatenate(actions).astype(np.float32)).clamp(-1, 1),
+    )
+
+
+class PixelActor(nn.Module):
+    """Actor on pictures (n, PIXELS, PIXELS, FRAMES), 0 .. 255; actions (n, 2)."""
+
+    def __init__(self, hidden: Sequence[int]) -> None:
+        super().__init__()
+        layers: list[nn.Module] = [
+            *(nn.Conv2d(FRAMES, 16, 8, 4), nn.ReLU()),
+            *(nn.Conv2d(16, 32, 4, 2), nn.ReLU()),
+            *(nn.Conv2d(32, 32, 3, 1), nn.ReLU(), nn.Flatten()),
+        ]
+        with torch.no_grad():
+            blank = torch.zeros(1, FRAMES, PIXELS, PIXELS)
+            size = nn.Sequential(*layers)(blank).shape[1]
+        for width in hidden:
+            layers += [nn.Linear(size, width), nn.ReLU()]
+            size = width
+        self.layers = nn.Sequential(*layers, nn.Linear(size, 2))
+
+    def forward(self, pictures: Tensor) -> Tensor:
+        found: Tensor = self.layers(pictures.permute(0, 3, 1, 2) / 255.0)
+        return found
+
+    def driver(self) -> Driver:
+        """Return the actor as a driver."""
+
+        def predict(observation: Any, deterministic: bool) -> Array:
+            with torch.inference_mode():
+                rows = torch.from_numpy(np.asarray(observation, np.float32))
+                return np.asarray(self(rows).numpy())
+
+        shape = PIXELS, PIXELS, FRAMES
+        return Policy(predict, shape, "pixels", "training", can_sample=False)
+
+    def save_onnx(self, card: dict[str, Any], path: Path) -> None:
+        """Write the actor as an ONNX model, with a card."""
+        graph = Graph()
+        x = graph.node("Transpose", "observation", perm=[0, 3, 1, 2])
+        x = graph.node("Div", x, graph.constant("white", 255.0))
+        for i, layer in enumerate(self.layers):
+            if not isinstance(layer, (nn.Conv2d, nn.Linear)):
+                x = graph.node({nn.ReLU: "Relu", nn.Flatten: "Flatten"}[type(layer)], x)
+                continue
+            state = {k: v.numpy() for k, v in layer.state_dict().items()}
+            arrays = [graph.constant(f"{k}_{i}", array) for k, array in state.items()]
+            if isinstance(layer, nn.Conv2d):
+                x = graph.node("Conv", x, *arrays, strides=list(layer.stride))
+            else:
+                x = graph.node("Gemm", x, *arrays, transB=1)
+        graph.save(x, (PIXELS, PIXELS, FRAMES), card, path)
+
+
+class PixelCloning:
+    """Behaviour cloning from pixels in a run.
+
+    Args:
+        run: whose folder is kept up to date.
+    """
+
+    def __init__(self, run: TrainingRun[OfflineConfig]) -> None:
+        config = self._config = run.config
+        self._run = run
+        scene = find_scenario(config.scenario, **config.options).scene
+        files = [Path(path) for path in config.data]
+        self._data = draw_pictures(files, scene, config.seat)
+        # A resumed run draws other steps than those of its beginning.
+        torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
+        self.model = PixelActor(config.hidden)
+        self._optimizer = torch.optim.Adam(self.model.parameters(), fused=True)
+        if run.progress.steps:
+            state = torch.load(run.folder / "last.pt", weights_only=True)
+            self.model.load_state_dict(state["model"])
+            self._optimizer.load_state_dict(state["optimizer"])
+        self._log = RunLog(run.folder, run.progress.steps)
+
+    def train(self) -> Metrics:
+        """Train to the end of the run; return the last evaluation."""
+        run, row, config = self._run, self._run.latest, self._config
+        run.end_setup()
+        while run.steps_left > 0:
+            first = run.progress.steps
+            last = min(first + REPORT, config.total_steps)
+            loss = float(np.mean([self._descend(k) for k in range(first, last)]))
+            run.update_progress(last, config.learning_rate)
+            self._log.record("train/actor", loss)
+            if run.evaluation_due or run.steps_left <= 0:
+                metrics = evaluate_policy(lambda _: self.model.driver(), config)
+                row = run.record_evaluation(metrics, self._save)
+            self._log.dump(last)
+        self._log.close()
+        return row
+
+    def _descend(self, step: int) -> float:
+        """Descend once on a batch of steps; return the loss."""
+        pictures, action = self._data.sample(self._config.batch_size)
+        rate = 0.5 * (1.0 + math.cos(math.pi * step / self._config.total_steps))
+        for group in self._optimizer.param_groups:
+            group["lr"] = self._config.learning_rate * rate
+        loss = (self.model(pictures.float()) - action).square().sum(-1).mean()
+        self._optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        self._optimizer.step()
+        return float(loss.detach())
+
+    def _save(self, name: str) -> None:
+        """Write the policy, and all that it goes on from, under a name."""
+        folder, config = self._run.folder, self._config
+        draft = folder / f"part-{name}.pt"
+        state: dict[str, Any] = {"model": self.model.state_dict()}
+        if name == "last":
+            state["optimizer"] = self._optimizer.state_dict()
+        torch.save(state, draft)
+        draft.replace(folder / f"{name}.pt")
+        card = {**config.card([]), "algo": config.algo}
+        card["steps"] = self._run.progress.steps
+        self.model.save_onnx(card, folder / f"{name}.onnx")
+
+
+def clone_from_pixels(run: TrainingRun[OfflineConfig]) -> Metrics:
+    """Train a run from where it stands to its end; return the last evaluation."""
+    with training_threads(run.config.torch_threads):
+        return PixelCloning(run).train()
