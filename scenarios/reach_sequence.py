@@ -79,10 +79,10 @@ class ReachSequence(Scenario):
             "gap": length(own - goal),
         }
 
-    def _goal(self, memory: Memory, turn: Array) -> Array:
-        """(..., 2) goal of a turn; the last one beyond it."""
-        turn = np.minimum(turn, self.count - 1.0)[..., None]
-        mine = turn == np.arange(self.count)
+    def _goal(self, memory: Memory, index: Array) -> Array:
+        """(..., 2) goal of an index; the last one beyond it."""
+        kept = np.minimum(index, self.count - 1.0)[..., None]
+        mine = kept == np.arange(self.count)
         return np.asarray((memory["goals"] * mine[..., None]).sum(-2))
 
     observation = (
