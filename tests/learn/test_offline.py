@@ -165,7 +165,11 @@ def test_recordings_with_goals_apart_are_learned_from(tmp_path, given):
     assert evaluate(policy, "hit_goal", episodes=2, goals="dict").episodes == 2
 
 
-def test_recordings_without_observations_are_refused(tmp_path):
+def test_recordings_of_pixels_are_cloned_from_pixels_alone(tmp_path):
     record(tmp_path, "still", "hit_goal", 2, observe="pixels")
+    assert offline_config("bc", [tmp_path], {}).observe == "pixels"
+    with pytest.raises(ValueError, match="bc alone"):
+        offline_config("iql", [tmp_path], SMALL)
+    size = ah.make_world("hit_goal", 1).observer.layout.centre.size
     with pytest.raises(ValueError, match="no observations"):
-        run_training(offline_config("bc", [tmp_path], SMALL), tmp_path / "run")
+        load_dataset(recordings_in([tmp_path]), 0, 1.0, 0.99, size)

@@ -98,7 +98,7 @@ def offline_config(
     files = recordings_in([built(path) for path in data])
     head = shared_head(files)
     goals = {"goals": head["goals"]} if "goals" in head else {}
-    pixels = changes.get("observe") == "pixels"
+    pixels = changes.get("observe", head["observe"]) == "pixels"
     if pixels:
         _check_pixels(algo, head)
     for name in ("scenario", "options", "observe", "control_dt"):
