@@ -132,6 +132,9 @@ class HitGoalVelocity(FewShots, GoalScenario):
         gap = length(t.after.puck[..., 0, :] - t.memory["goal"])
         return np.asarray(gap < 0.1012)
 
+    def targets(self, memory: Memory) -> Array | None:
+        return None  # Goals follow from the physics, after the start: see `reset`.
+
     @property
     def goal_bounds(self) -> tuple[float, ...]:
         return (*self.table_geometry.size / 2, 5.0, 5.0, 1.0)

@@ -112,6 +112,9 @@ class ReachSequence(Scenario):
         """(...) bool: the paddle has been at all goals in turn."""
         return np.asarray(t.new_memory["passed"] >= self.count)
 
+    def targets(self, memory: Memory) -> Array | None:
+        return memory["goals"]
+
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         left = memory["goals"][int(memory["passed"]) :]
         return [Mark.circle(goal, self.radius) for goal in left]

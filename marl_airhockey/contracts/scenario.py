@@ -194,10 +194,14 @@ class Scenario(ABC):
         """(...) bool: the success of the paper's published code at this step.
 
         From github.com/CalCharles/air-hockey-rl, commits aee389d and 747580d, whose x
-        has the opposite sign. With rules="paper" it is the success, ends the episode
-        and is paid; so is a puck lost at home, without a price of its own.
+        has the opposite sign. With rules="paper" it replaces `success`, also in the
+        rewards, and ends the episode.
         """
         raise NotImplementedError(f"{type(self).__name__} is not a task of the paper")
+
+    def targets(self, memory: Memory) -> Array | None:
+        """(W, n, 2) points that obstacles must leave free; None if there are none."""
+        return None
 
     def marks(self, state: State, memory: Memory) -> list[Mark]:
         """Return what to draw for one world, leading axes gone."""
@@ -338,8 +342,10 @@ def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
         if len(element) not in sizes or not np.isfinite(element).all():
             words = " or ".join(map(str, sizes))
             raise ValueError(f"{name}: {value!r} must be lists of {words} numbers")
-        if element[2] <= 0 or (name == "drag_regions" and element[3] < 0):
-            raise ValueError(f"{name}: element {k}, {element}, has a number below 0")
+        if element[2] <= 0:
+            raise ValueError(f"{name}: element {k}, {element}: radius must be above 0")
+        if name == "drag_regions" and element[3] < 0:
+            raise ValueError(f"{name}: element {k}, {element}: drag is below 0")
     return found
 
 
@@ -388,6 +394,9 @@ class GoalScenario(Scenario):
     @abstractmethod
     def goal_reward(self, achieved: Array, desired: Array) -> Array:
         """(...) 1 where the goal is met, else 0; a function of goals alone."""
+
+    def targets(self, memory: Memory) -> Array | None:
+        return self.desired(memory)[..., None, :2]
 
     def shown_reward(self, achieved: Array, desired: Array) -> Array:
         """(...) `goal_reward` of goals from observations, in double precision."""

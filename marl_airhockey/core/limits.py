@@ -2,8 +2,8 @@
 
 A commanded velocity is within the top speed, within the acceleration of the one before,
 and, toward an edge of the reach, no higher than a paddle can still brake from in front
-of it, so that no position is ever clipped. An obstacle is an edge across the way to its
-nearest point: what stays behind that edge does not meet the obstacle, which is convex.
+of it, so that no position is ever clipped. An obstacle counts as an edge through its
+nearest point: as it is convex, what stays outside that edge does not meet it.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ class RandomStreams:
         return some
 
     def _units(self, *shape: int) -> Array:
-        """Draw (W, *shape) numbers uniform in [0, 1)."""
+        """Sample (W, *shape) numbers uniform in [0, 1)."""
         unit = np.empty((len(self._rows), math.prod(shape)))
         _unit(self._keys, self._counts, self._rows, unit)
         return unit.reshape(len(unit), *shape)

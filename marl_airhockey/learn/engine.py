@@ -120,10 +120,17 @@ def save_weights(
         optimizer: of the model.
         policy: the model's, as it is now.
     """
+    save_state(folder, name, model, optimizer)
+    policy.save(folder / f"{name}.npz")
+
+
+def save_state(
+    folder: Path, name: str, model: torch.nn.Module, optimizer: torch.optim.Optimizer
+) -> None:
+    """Write weights under a name, and under "last" the optimizer, too."""
     draft = folder / f"part-{name}.pt"
     state: dict[str, Any] = {"model": model.state_dict()}
     if name == "last":
         state["optimizer"] = optimizer.state_dict()
     torch.save(state, draft)
     draft.replace(folder / f"{name}.pt")
-    policy.save(folder / f"{name}.npz")

@@ -125,7 +125,7 @@ def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
 
 
 def training_command(config: AnyConfig) -> str:
-    """Return the command line that trains a configuration anew.
+    """Return the command line that trains a configuration again.
 
     Recordings are named by their folders, and data of a named dataset by its name.
     """

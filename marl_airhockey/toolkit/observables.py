@@ -225,9 +225,9 @@ class Goal(Observable):
     goal = True
 
     def columns(self, scope: ObservationContext) -> list[Column]:
-        where = scope.position_columns(self.name, self.unit, self.x)
-        way = scope.offset_columns(f"{self.origin}_to_{self.name}", self.unit)
-        return where + way
+        position = scope.position_columns(self.name, self.unit, self.x)
+        offset = scope.offset_columns(f"{self.origin}_to_{self.name}", self.unit)
+        return position + offset
 
     def write(self, ego: EgoView, out: Array) -> None:
         goal = ego.rotate(ego.kept(self.name)[..., None, :])[..., 0, :]

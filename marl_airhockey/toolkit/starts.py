@@ -155,7 +155,7 @@ def _serve(
         place = middle
         for k in range(2 * SIDESTEPS + 1):
             y, free = middle + 0.02 * ((k + 1) // 2) * (1 if k % 2 else -1), True
-            for i in range(first + pucks):
+            for i in range(len(radius)):
                 touch = radius[i] + radius[body] + 0.005
                 x, aside = position[w, i, 0], position[w, i, 1] - y
                 free &= i == body or x * x + aside * aside > touch * touch

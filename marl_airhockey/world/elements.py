@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.contracts.backend import Backend
-from marl_airhockey.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.limits import away
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.seat import ReachPlanes
@@ -13,13 +13,40 @@ from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.types import Array, Memory
 
 TRIES = 1000
-"""Number of starts that are drawn until one is clear of the obstacles"""
+"""Number of starts that are sampled until one is clear of the obstacles"""
+SERVE_ROOM = 0.1
+"""Distance (m) from the middle of the table, where pucks are served, to obstacles"""
+
+
+def check_elements(scenario: Scenario, real: bool) -> None:
+    """Refuse elements that a scenario or a real table cannot have.
+
+    Raises:
+        ValueError: An option, named, and why.
+    """
+    if scenario.drag_regions and scenario.scene.pucks != 1:
+        raise ValueError(
+            f"drag_regions: one puck is needed, {scenario.name} has "
+            f"{scenario.scene.pucks}"
+        )
+    if scenario.drag_regions and real:
+        raise ValueError("drag_regions: a real table has none")
+    if type(scenario).serve is Scenario.serve:
+        return
+    table, seats = scenario.scene.table, scenario.scene.seats
+    room = SERVE_ROOM - table.paddle_radius
+    for row in ReachPlanes.of(table, seats).obstacles:
+        if away(row, 0.0, 0.0)[2] < room:
+            raise ValueError(
+                f"obstacles: pucks are served in the middle of the table; leave "
+                f"{SERVE_ROOM} m free around it"
+            )
 
 
 def clear_start(
     scenario: Scenario, rng: RandomStreams, worlds: int
 ) -> tuple[State, Memory]:
-    """Draw starts in which no body, and no goal, is at an obstacle.
+    """Sample starts in which no body, and no target, is at an obstacle.
 
     Raises:
         ValueError: Obstacles leave no room.
@@ -40,37 +67,28 @@ def clear_start(
 
 
 def _blocked(scenario: Scenario, state: State, memory: Memory) -> Array:
-    """(W,) bool: a body or the goal of a world overlaps an obstacle."""
-    goals = isinstance(scenario, GoalScenario) and "goal" in memory
-    found = np.zeros(len(state.time), np.bool_)
-    for obstacle in ReachPlanes.of(
-        scenario.table_geometry, scenario.scene.seats
-    ).obstacles:
-        for w in range(len(found)):
-            points = [*state.position[w, : state.bodies.movers]]
-            points += [memory["goal"][w, :2]] if goals else []
-            # Paddles are the largest of what moves.
-            found[w] |= any(away(obstacle, x, y)[2] < 0.0 for x, y in points)
-    return found
+    """(W,) bool: a body or a target of a world overlaps an obstacle."""
+    points = state.position[:, : state.bodies.movers]
+    targets = scenario.targets(memory)
+    if targets is not None:
+        points = np.concatenate([points, targets], 1)
+    rows = ReachPlanes.of(scenario.scene.table, scenario.scene.seats).obstacles
+    # Paddles are the largest of what moves.
+    found = [
+        any(away(row, x, y)[2] < 0.0 for row in rows for x, y in world)
+        for world in points
+    ]
+    return np.array(found, np.bool_)
 
 
 class DragRegions:
-    """Drag of pucks in regions, set in the backend as pucks enter and leave them.
-
-    Raises:
-        ValueError: There is not one puck.
-    """
+    """Drag of the puck in regions, set in the backend as it enters and leaves them."""
 
     def __init__(self, scenario: Scenario, worlds: int) -> None:
-        pucks = scenario.scene.pucks
-        if pucks != 1:
-            raise ValueError(
-                f"drag_regions: need one puck, {scenario.name} has {pucks}"
-            )
         self._scenario, self._set = scenario, np.full(worlds, np.nan)
 
     def forget(self, worlds: Array) -> None:
-        """Set the drag anew at the next step of some worlds, by index."""
+        """Set the drag again at the next step of some worlds, by index."""
         self._set[worlds] = np.nan
 
     def update(self, backend: Backend, state: State, physics: dict[str, Array]) -> None:

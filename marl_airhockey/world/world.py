@@ -32,7 +32,7 @@ from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
-from marl_airhockey.world.elements import DragRegions, clear_start
+from marl_airhockey.world.elements import DragRegions, check_elements, clear_start
 from marl_airhockey.world.episode import Episode, PhysicsRows
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.referee import Referee
@@ -99,6 +99,7 @@ class World:
         self._sensed = self._known = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
+        check_elements(scenario, backend.senses_itself)
         self._drag = DragRegions(scenario, b) if scenario.drag_regions else None
         self.start_spread = 1.0
         """Share of the ranges, about their middles, from which episodes start"""

@@ -11,22 +11,20 @@ row to ``docs/data/announced.csv``; a run whose row is there is not trained agai
 
 from __future__ import annotations
 
-import csv
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
+from rows import Row, keep, read
 
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -120,23 +118,10 @@ def train(scenario: str, changes: Row, place: Path) -> Path:
     return place
 
 
-def read(path: Path) -> list[Row]:
-    """Return the rows of a CSV file; none if there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def keep(row: Row) -> None:
-    """Add a row to those there are, in order."""
-    rows = [*read(ROWS), {name: str(value) for name, value in row.items()}]
-    order = [(name, case) for name, study in STUDIES.items() for case in study.cases]
-    rows.sort(key=lambda r: (order.index((r["study"], r["case"])), int(r["seed"])))
-    with ROWS.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(row), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+def order(row: Row) -> tuple[int, int]:
+    """Return what rows are sorted by."""
+    cases = [(name, case) for name, study in STUDIES.items() for case in study.cases]
+    return cases.index((row["study"], row["case"])), int(row["seed"])
 
 
 def table() -> list[list[str]]:
@@ -184,7 +169,7 @@ def main(
     with ProcessPoolExecutor(jobs) as pool:
         runs = [pool.submit(train_case, *run, folder) for run in wanted]
         for run in as_completed(runs):
-            keep(run.result())
+            keep(ROWS, run.result(), order)
             print(run.result(), flush=True)
 
 

@@ -12,12 +12,12 @@ A run whose row is there is not trained again, and one that was cut off resumes.
 
 from __future__ import annotations
 
-import csv
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rows import Row, keep, read
 
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.hindsight.config import hindsight_config
@@ -40,7 +40,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
 ROWS = Path(__file__).parents[2] / "docs" / "data" / "hindsight.csv"
 KEY = ("task", "variant", "seed")
 EPISODES = 500
-Row = dict[str, Any]
 
 
 def train_run(task: str, variant: str, seed: int, folder: Path) -> Row:
@@ -68,22 +67,9 @@ def train_run(task: str, variant: str, seed: int, folder: Path) -> Row:
     }
 
 
-def read(path: Path) -> list[Row]:
-    """Return the rows of a CSV file; none if there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def keep(row: Row) -> None:
-    """Add a row to those there are, in order."""
-    rows = [*read(ROWS), {name: str(value) for name, value in row.items()}]
-    rows.sort(key=lambda r: (list(STEPS).index(r["task"]), r["variant"], r["seed"]))
-    with ROWS.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(row), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+def order(row: Row) -> tuple[Any, ...]:
+    """Return what rows are sorted by."""
+    return list(STEPS).index(row["task"]), row["variant"], int(row["seed"])
 
 
 def main(
@@ -109,7 +95,7 @@ def main(
     with ProcessPoolExecutor(jobs) as pool:
         runs = [pool.submit(train_run, *run, folder) for run in wanted]
         for run in as_completed(runs):
-            keep(run.result())
+            keep(ROWS, run.result(), order)
             print(run.result(), flush=True)
 
 

@@ -23,7 +23,6 @@ tables of these rows.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -31,6 +30,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rows import Row, keep, read
 
 from marl_airhockey import make_agent
 from marl_airhockey.contracts.driver import Driver
@@ -55,7 +55,7 @@ ALGOS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """Algorithms and their settings by column; bc10 clones the best tenth of episodes"""
 COLUMNS = ("random", *ALGOS, "rl")
-"""What rows are of"""
+"""Names of the columns of a table, which rows belong to"""
 EXPERT = "expert"
 SEED = 10_000_000
 """Seed of the first recorded episode, far from those of evaluations"""
@@ -66,7 +66,6 @@ FIELDS = (
     *("domain", "tier", "task", "algo", "seed", "success", "return", "episodes"),
     *("steps", "cpu_minutes"),
 )
-Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -203,33 +202,15 @@ def learn(data: Path, column: str, seed: int, place: Path) -> None:
     run_training(None if (place / "config.toml").exists() else config, place)
 
 
-def read(path: Path) -> list[Row]:
-    """Return the rows of a CSV file; none if there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def keep(row: Row) -> None:
-    """Add a row to those there are, in order."""
-    rows = [*read(ROWS), {name: str(value) for name, value in row.items()}]
-    domains = list(DOMAINS)
-    rows.sort(
-        key=lambda r: (
-            domains.index(r["domain"]),
-            r["tier"],
-            TASKS.index(r["task"]),
-            COLUMNS.index(r["algo"]),
-            int(r["seed"]),
-        )
+def order(row: Row) -> tuple[Any, ...]:
+    """Return what rows are sorted by."""
+    return (
+        list(DOMAINS).index(row["domain"]),
+        row["tier"],
+        TASKS.index(row["task"]),
+        COLUMNS.index(row["algo"]),
+        int(row["seed"]),
     )
-    draft = ROWS.with_suffix(".part")
-    with draft.open("w", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    draft.replace(ROWS)
 
 
 def main(
@@ -260,7 +241,7 @@ def main(
     with ProcessPoolExecutor(jobs) as pool:
         cells = [pool.submit(train_cell, *cell, folder) for cell in wanted]
         for cell in as_completed(cells):
-            keep(cell.result())
+            keep(ROWS, cell.result(), order)
             print(cell.result(), flush=True)
 
 

@@ -11,7 +11,7 @@ import torch
 import marl_airhockey as ah
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.learn.offline.config import offline_config
-from marl_airhockey.learn.offline.pixels import PixelActor, draw_pictures
+from marl_airhockey.learn.offline.pixels import PixelActor, render_pictures
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.registry import make_agent
 
@@ -30,7 +30,7 @@ def expert(tmp_path_factory):
 
 def test_pictures_of_a_recording_are_those_that_pixels_show(expert):
     scene = ah.make_scenario("hit_goal").scene
-    data = draw_pictures([expert], scene, 0)
+    data = render_pictures([expert], scene, 0)
     env = ah.gym_env("hit_goal", observe="pixels")
     row = 0
     for seed in (3, 4, 5):

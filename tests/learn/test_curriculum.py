@@ -32,7 +32,7 @@ def test_every_start_can_be_narrowed(task):
     assert spans[1] == pytest.approx(0.1 * spans[0], rel=1e-6)
 
 
-def test_ranges_widen_in_training_and_a_run_goes_on_with_them(tmp_path):
+def test_ranges_widen_in_training_and_are_kept_with_the_run(tmp_path):
     changes = {
         **{"total_steps": 40_000, "num_worlds": 64, "batch_size": 512},
         **{"evaluations": 2, "eval_episodes": 4, "curriculum": 0.3},

@@ -40,7 +40,7 @@ def test_nothing_enters_an_obstacle(backend):
         assert rooms(world, state.puck, table.puck_radius).min() > -deepest
 
 
-def test_a_paddle_drives_around_an_obstacle_and_is_stopped_by_a_wall_of_it():
+def test_a_paddle_stops_in_front_of_an_obstacle():
     world = ah.make_world("reach", 1, options={"obstacles": POSTS})
     world.autoreset = False
     world.reset(0)
@@ -112,7 +112,7 @@ def test_elements_are_drawn():
     [
         ({"obstacles": [[0.2, 0.0]]}, "obstacles.*3 or 5 numbers"),
         ({"obstacles": 3}, "obstacles.*3 or 5 numbers"),
-        ({"obstacles": [[0.2, 0.0, -0.1]]}, "obstacles.*below 0"),
+        ({"obstacles": [[0.2, 0.0, -0.1]]}, "obstacles.*above 0"),
         ({"reward_regions": [[0.2, 0.0, 0.1]]}, "reward_regions.*4 numbers"),
         ({"drag_regions": [[0.2, 0.0, 0.1, -1.0]]}, "drag_regions.*below 0"),
     ],
@@ -125,6 +125,29 @@ def test_bad_elements_are_refused_by_name(options, words):
 def test_what_cannot_be_is_refused():
     with pytest.raises(ValueError, match=r"drag_regions.*one puck"):
         ah.make_world("reach", options={"drag_regions": [[0.2, 0.0, 0.1, 1.0]]})
+    with pytest.raises(ValueError, match=r"obstacles.*served"):
+        ah.make_world("duel", options={"obstacles": [[0.0, 0.05, 0.02]]})
     world = ah.make_world("touch", options={"obstacles": [[0.6, 0.0, 0.29]]})
     with pytest.raises(ValueError, match=r"obstacles.*no room"):
         world.reset(0)
+
+
+def test_goals_in_turn_and_serves_are_clear_of_obstacles():
+    world = ah.make_world("reach_sequence", 64, options={"obstacles": POSTS})
+    world.reset(0)
+    goals = world.memory["goals"]
+    assert (rooms(world, goals, world.scene.table.paddle_radius) >= 0).all()
+    posts = {"obstacles": [[0.0, 0.15, 0.04], [0.0, -0.15, 0.04]]}
+    world = ah.make_world("duel", 64, options=posts)
+    world.reset(0)
+    for _ in range(200):
+        world.step(np.zeros((64, 2, 2)))
+        gap = rooms(world, world.state.puck, world.scene.table.puck_radius).min()
+        assert gap > -2.5e-4
+
+
+def test_goals_that_follow_from_a_shot_do_not_hinder_a_start():
+    post = {"obstacles": [[0.0, 0.0, 0.03]]}
+    world = ah.make_world("hit_goal_velocity", 8, options=post)
+    world.reset(0)
+    assert np.isfinite(world.memory["goal"]).all()

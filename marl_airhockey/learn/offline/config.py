@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,6 +66,11 @@ class OfflineConfig(RunConfig):
     noise_clip: float = 0.5
     """Of TD3+BC and ReBRAC: largest magnitude of that noise"""
 
+    def rate(self, step: int) -> float:
+        """Return the learning rate of a step: half a cosine, to nothing at the end."""
+        share = 0.5 * (1.0 + math.cos(math.pi * step / self.total_steps))
+        return self.learning_rate * share
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.algo not in ALGORITHMS:
@@ -102,7 +108,7 @@ def offline_config(
     if pixels:
         _check_pixels(algo, head)
     for name in ("scenario", "options", "observe", "control_dt"):
-        shown = pixels and name == "observe"  # Drawn from the recorded states.
+        shown = pixels and name == "observe"  # Rendered from the recorded states.
         if name in changes and changes[name] != head[name] and not shown:
             raise ValueError(
                 f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r}"
@@ -133,11 +139,11 @@ def offline_config(
 
 
 def _check_pixels(algo: str, head: Mapping[str, Any]) -> None:
-    """Refuse to learn from pixels what cannot be drawn or is not cloned."""
+    """Refuse to learn from pixels what cannot be rendered or is not cloned."""
     if algo != "bc":
         raise ValueError(f'observe: from "pixels" learns bc alone, not {algo}')
     if head["profile"] != "ideal" or "goals" in head:
         raise ValueError(
-            'observe: "pixels" are drawn from states, as they are seen in the profile '
-            "ideal with flat goals; the recordings are of others"
+            'observe: "pixels" are rendered from states, as the profile '
+            "ideal with flat goals shows them; the recordings are of others"
         )

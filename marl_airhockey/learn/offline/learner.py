@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -102,10 +101,8 @@ class Learner:
         """Descend once on a batch of steps; return the losses."""
         model = self.model
         batch = self._data.sample(self._config.batch_size)
-        # Half a cosine, to nothing at the end (Kostrikov et al., for the actor).
-        rate = 0.5 * (1.0 + math.cos(math.pi * step / self._config.total_steps))
         for group in self._optimizer.param_groups:
-            group["lr"] = self._config.learning_rate * rate
+            group["lr"] = self._config.rate(step)
         scaled = batch._replace(
             observation=model.scaled(batch.observation),
             next_observation=model.scaled(batch.next_observation),

@@ -1,12 +1,11 @@
 """Behaviour cloning from pixels: the same pictures as ``observe="pixels"`` shows.
 
-Recordings hold states, from which the pictures are drawn. The network is that of Mnih
-et al. (2015) with half of the channels. Its policy is an ONNX model.
+Recordings hold states, from which the pictures are rendered. The network is that of
+Mnih et al. (2015) with half of the channels. Its policy is an ONNX model.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +18,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.observable import FRAMES
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.reader import episodes_of
-from marl_airhockey.learn.engine import training_threads
+from marl_airhockey.learn.engine import save_state, training_threads
 from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
 from marl_airhockey.learn.logs import RunLog
 from marl_airhockey.learn.offline.config import OfflineConfig
@@ -38,12 +37,12 @@ COLUMNS = ("state.position", "memory.goal", "action")
 
 
 class Pictures(NamedTuple):
-    """Steps of one seat, with what it saw."""
+    """Steps of one seat, with the pictures that it observed."""
 
     frames: Tensor
     """(M, PIXELS, PIXELS) uint8"""
     shown: Tensor
-    """(N, FRAMES) numbers of the frames that are seen at a step, newest last"""
+    """(N, FRAMES) numbers of the frames that are observed at a step, newest last"""
     action: Tensor
     """(N, 2), in -1 .. 1"""
 
@@ -54,8 +53,8 @@ class Pictures(NamedTuple):
         return pictures, self.action[rows]
 
 
-def draw_pictures(files: Sequence[Path], scene: Scene, seat: int) -> Pictures:
-    """Draw what a seat saw in recordings.
+def render_pictures(files: Sequence[Path], scene: Scene, seat: int) -> Pictures:
+    """Render what a seat observed in recordings.
 
     Raises:
         ValueError: There are no steps.
@@ -153,8 +152,8 @@ class PixelCloning:
         self._run = run
         scene = find_scenario(config.scenario, **config.options).scene
         files = [Path(path) for path in config.data]
-        self._data = draw_pictures(files, scene, config.seat)
-        # A resumed run draws other steps than those of its beginning.
+        self._data = render_pictures(files, scene, config.seat)
+        # A resumed run samples other steps than those of its beginning.
         torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
         self.model = PixelActor(config.hidden)
         self._optimizer = torch.optim.Adam(self.model.parameters(), fused=True)
@@ -166,6 +165,12 @@ class PixelCloning:
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""
+        try:
+            return self._train()
+        finally:
+            self._log.close()
+
+    def _train(self) -> Metrics:
         run, row, config = self._run, self._run.latest, self._config
         run.end_setup()
         while run.steps_left > 0:
@@ -178,15 +183,13 @@ class PixelCloning:
                 metrics = evaluate_policy(lambda _: self.model.driver(), config)
                 row = run.record_evaluation(metrics, self._save)
             self._log.dump(last)
-        self._log.close()
         return row
 
     def _descend(self, step: int) -> float:
         """Descend once on a batch of steps; return the loss."""
         pictures, action = self._data.sample(self._config.batch_size)
-        rate = 0.5 * (1.0 + math.cos(math.pi * step / self._config.total_steps))
         for group in self._optimizer.param_groups:
-            group["lr"] = self._config.learning_rate * rate
+            group["lr"] = self._config.rate(step)
         loss = (self.model(pictures.float()) - action).square().sum(-1).mean()
         self._optimizer.zero_grad(set_to_none=True)
         loss.backward()
@@ -194,20 +197,15 @@ class PixelCloning:
         return float(loss.detach())
 
     def _save(self, name: str) -> None:
-        """Write the policy, and all that it goes on from, under a name."""
+        """Write the policy, and all that a resumed run needs, under a name."""
         folder, config = self._run.folder, self._config
-        draft = folder / f"part-{name}.pt"
-        state: dict[str, Any] = {"model": self.model.state_dict()}
-        if name == "last":
-            state["optimizer"] = self._optimizer.state_dict()
-        torch.save(state, draft)
-        draft.replace(folder / f"{name}.pt")
+        save_state(folder, name, self.model, self._optimizer)
         card = {**config.card([]), "algo": config.algo}
         card["steps"] = self._run.progress.steps
         self.model.save_onnx(card, folder / f"{name}.onnx")
 
 
 def clone_from_pixels(run: TrainingRun[OfflineConfig]) -> Metrics:
-    """Train a run from where it stands to its end; return the last evaluation."""
+    """Train a run to its end; return the last evaluation."""
     with training_threads(run.config.torch_threads):
         return PixelCloning(run).train()
