@@ -185,8 +185,17 @@ class FreeForAll(Scenario):
     def eliminated(self, memory: Memory) -> Array | None:
         return np.asarray(memory["lives"] <= 0.0)
 
-    def caption(self, memory: Memory) -> str:
-        return "lives " + " : ".join(f"{lives:.0f}" for lives in memory["lives"])
+    def scores(self, memory: Memory) -> dict[str, Array]:
+        """Return lives, and shots on goal that were stopped, by seat."""
+        return {"lives": memory["lives"], "shots": memory["shots"]}
+
+    def decided_by(self, memory: Memory) -> str:
+        """Return "lives", or "shots on goal" of those that have most; "" if level."""
+        leading = memory["lives"] == memory["lives"].max()
+        if leading.sum() == 1:
+            return "lives"
+        shots = memory["shots"][leading]
+        return "shots on goal" if (shots == shots.max()).sum() == 1 else ""
 
     def success(self, t: Transition) -> Array:
         """(..., seats) bool: the seat is the last one, or leads as the clock ends."""

@@ -115,8 +115,8 @@ class Rally(Scenario):
         slow = length(t.after.puck_velocity[..., 0, :]) < rewards.SLOW
         return np.asarray(slow | (t.new_memory["idle"] >= self.patience - 1e-9))
 
-    def caption(self, memory: Memory) -> str:
-        return f"crossings {memory['crossings']:.0f}"
+    def scores(self, memory: Memory) -> dict[str, Array]:
+        return {"crossings": memory["crossings"]}
 
     def success(self, t: Transition) -> Array:
         """(...) bool: the puck has crossed the middle ``crossings`` times."""

@@ -113,8 +113,8 @@ class TeamJuggle(Scenario):
     def terminated(self, t: Transition) -> Array:
         return rewards.lost(t)
 
-    def caption(self, memory: Memory) -> str:
-        return f"passes {memory['passes']:.0f}"
+    def scores(self, memory: Memory) -> dict[str, Array]:
+        return {"passes": memory["passes"]}
 
     def success(self, t: Transition) -> Array:
         """(...) bool: the puck has been passed up ``passes`` times in alternation."""

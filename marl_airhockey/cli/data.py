@@ -211,6 +211,7 @@ def report(
     from marl_airhockey.play.plots import plot_report
     from marl_airhockey.play.report import summarize
     from marl_airhockey.study.answers import read_answers
+    from marl_airhockey.study.tables import save
 
     found, answers = summarize(folder, scenario), read_answers(folder)
     files = found.save(out or folder)
@@ -218,11 +219,13 @@ def report(
     plot_report(found, plot)
     files.append(plot)
     if answers.participants:
-        files += answers.save(out or folder)
+        files += save(answers, out or folder)
     if as_json:
         console.print_json(files[0].read_text())
         return
     for path in files:
         if path.suffix == ".md":
             console.print(path.read_text(), markup=False, soft_wrap=True)
+    for words in found.skipped:
+        console.print(f"skipped: {words}", soft_wrap=True, markup=False)
     console.print("files:", *files, soft_wrap=True)

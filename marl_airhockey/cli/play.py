@@ -25,22 +25,22 @@ from marl_airhockey.cli.options import (
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
-from marl_airhockey.play.handicap import BOUNDS, Handicap
+from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
 
+    from marl_airhockey.play.access import AccessCheck
     from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.open_table import Plant
-    from marl_airhockey.play.server import AccessCheck
 
 Host = Annotated[str, typer.Option(help="Address to listen at; others need the token.")]
 Port = Annotated[int, typer.Option(help="0 for a free one.", min=0, max=65535)]
 Browser = Annotated[bool, typer.Option(help="Open the page.")]
 Reaction = Annotated[
-    float,
+    float | None,
     typer.Option(
         help="ms by which programs act late.",
         min=1000.0 * BOUNDS["reaction"][0],
@@ -48,7 +48,7 @@ Reaction = Annotated[
     ),
 ]
 Noise = Annotated[
-    float,
+    float | None,
     typer.Option(
         help="Noise on actions of programs, of top speed.",
         min=BOUNDS["noise"][0],
@@ -56,7 +56,7 @@ Noise = Annotated[
     ),
 ]
 Pace = Annotated[
-    float,
+    float | None,
     typer.Option(
         help="Largest speed of programs, of top speed.",
         min=BOUNDS["pace"][0],
@@ -80,12 +80,16 @@ def play(
     backend: Backend = DEFAULT_BACKEND,
     profile: Profile = None,
     option: Options = None,
-    reaction: Reaction = 1000.0 * Handicap.reaction,
-    noise: Noise = Handicap.noise,
-    pace: Pace = Handicap.pace,
+    reaction: Reaction = None,
+    noise: Noise = None,
+    pace: Pace = None,
     record: Annotated[
         Path | None, typer.Option(help="Write every episode into this folder.")
     ] = None,
+    keep: Annotated[
+        int,
+        typer.Option(help="Most recordings; then the oldest of this table go.", min=1),
+    ] = 1000,
     host: Host = "127.0.0.1",
     port: Port = 8480,
     browser: Browser = True,
@@ -103,13 +107,19 @@ def play(
     keywords = environment(backend, profile, option, None, control_dt=kind.CONTROL_DT)
     seats = settings(driver)
     keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
-    handicap = Handicap(reaction / 1000.0, noise, pace)
+    delay = None if reaction is None else reaction / 1000.0
+    limits = {"reaction": delay, "noise": noise, "pace": pace}
+    given = {name: value for name, value in limits.items() if value is not None}
     with real_table(keywords, lab, rig) as table:
-        match = kind(scenario, {}, table, handicap)
+        match = kind(scenario, {}, table, Handicap(**given))
         seat_drivers(match, opponent, seats)
+        if not given and kind is LiveMatch and match.has_rivals:
+            match.set_handicap(PRESETS[USUAL])
         with waiting("preparing the table (longer when it is the first time)"):
             match.warm_up()
-        host_match(match, record, host, port, browser)
+        if record:
+            console.print(f"recordings: {record}, of this table the newest {keep}")
+        host_match(match, record, host, port, browser, keep=keep)
 
 
 def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywords:
@@ -130,6 +140,7 @@ def host_match(
     port: int,
     browser: bool,
     film: bool = False,
+    keep: int | None = None,
 ) -> None:
     """Serve a match until interrupted; of one in the virtual lab, with its faults.
 
@@ -140,6 +151,7 @@ def host_match(
         port: see `host_table`.
         browser: see `host_table`.
         film: whether to keep a real table's pictures beside the recordings.
+        keep: most recordings; None for all.
     """
     from marl_airhockey.play.open_table import open_table
     from marl_airhockey.play.real_match import RealMatch
@@ -147,7 +159,7 @@ def host_match(
     from marl_airhockey.play.server import application
 
     filmed = match.backend.camera if film and isinstance(match, RealMatch) else None
-    recorder = Recorder(record, filmed) if record else None
+    recorder = Recorder(record, filmed, keep) if record else None
     with contextlib.ExitStack() as stack:
         plant = None
         if isinstance(match, RealMatch):
@@ -233,7 +245,8 @@ def host_table(
         port: to listen at; 0 for a free one.
         browser: True to open the page.
     """
-    from marl_airhockey.play.server import AccessCheck, listen, serve
+    from marl_airhockey.play.access import AccessCheck
+    from marl_airhockey.play.connections import listen, serve
 
     access = AccessCheck(host)
     app = make(access)

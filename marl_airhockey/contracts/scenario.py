@@ -207,10 +207,21 @@ class Scenario(ABC):
         """Return what to draw for one world, leading axes gone."""
         return []
 
+    def scores(self, memory: Memory) -> dict[str, Array]:
+        """Return what one world's game counts, by name: by team or seat, or for all."""
+        touches = memory.get("touches")
+        return {} if touches is None else {"touches": touches.sum()}
+
     def caption(self, memory: Memory) -> str:
         """Return the score of one world in a few words."""
-        touches = memory.get("touches")
-        return "" if touches is None else f"touches {int(touches.sum())}"
+        return ", ".join(
+            f"{name} " + " : ".join(f"{count:.0f}" for count in np.ravel(counts))
+            for name, counts in self.scores(memory).items()
+        )
+
+    def decided_by(self, memory: Memory) -> str:
+        """Return by what one world's game is decided; "" if by nothing."""
+        return ""
 
     # Final methods: do not override.
 

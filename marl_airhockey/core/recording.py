@@ -63,6 +63,7 @@ UNITS: Mapping[str, tuple[str, str]] = {
     "violation": ("fraction of the limit", ""),
     "clock": ("s, Unix time", ""),
     "round_trip": ("ms", ""),
+    "pointer": ("m", "table"),
     "device.moment": ("s, monotonic", ""),
     "frame_taken": ("s, monotonic", ""),
 }

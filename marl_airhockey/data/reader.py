@@ -47,7 +47,7 @@ def read_head(path: Path) -> dict[str, Any]:
         raise ValueError(
             f"{path}: cannot be read as a recording: {error.strerror}"
         ) from error
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f"{file}: no recording of marl_airhockey") from error
     if not isinstance(head, dict) or "format" not in head:
         raise ValueError(f"{file}: no recording of marl_airhockey")

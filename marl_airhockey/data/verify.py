@@ -13,7 +13,7 @@ from marl_airhockey.data.replay import Replay
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
 
-MEASURED = ("clock", "round_trip")
+MEASURED = ("clock", "round_trip", "pointer")
 """Columns of play on a page that do not follow from states"""
 EXACT = 1e-9
 """Largest difference that rounding explains"""

@@ -77,7 +77,12 @@ class RecordingWriter:
         path.mkdir(parents=True)
         (path / STEPS).mkdir()
         self._start(path, {**head, "format": FORMAT}, [], 0)
-        self._write_meta()
+        try:
+            self._write_meta()
+        except OSError:
+            self._lock.close()
+            shutil.rmtree(path, ignore_errors=True)
+            raise
 
     @classmethod
     def extend(

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import secrets
 import time
+from typing import Any
 
+from marl_airhockey.play.link import Link
 from marl_airhockey.play.protocol import RateLimiter
 
 
@@ -30,9 +32,14 @@ class Client:
         """Time of the last movement, s."""
         self.last_held = float("-inf")
         """Time of the last aim by a pointer that is held, s."""
-        self.pointer = (0.0, 0.0)
+        self.pointer = (float("nan"), float("nan"))
         """Last aim, table frame, m."""
+        self.device: dict[str, Any] = {}
+        """Fields of the message ``device``, see `protocol.MESSAGES`."""
         self.limiter = RateLimiter(self.last_input)
         self.frame = ""
         """Newest message to be sent; it replaces one that was not sent in time."""
+        self.frame_number = 0
+        """Number of that frame."""
         self.frame_ready = asyncio.Event()
+        self.link = Link(self.last_input)

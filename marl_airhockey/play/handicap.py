@@ -61,6 +61,8 @@ PRESETS = {
     "gentle": Handicap(reaction=0.1, noise=0.1, pace=0.4),
 }
 """Handicaps that a page offers, the one without limits first."""
+USUAL = "human speed"
+"""Handicap of programs that play against people who have not chosen another one."""
 
 
 @dataclass

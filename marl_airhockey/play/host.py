@@ -50,6 +50,12 @@ class Host(ABC):
         """Return what one page alone gets at every tick in addition; JSON."""
         return {}
 
+    def clear_table(self, reason: str) -> None:
+        """End the match and its recording, so that others find a fresh lobby."""
+        if self.recorder is not None:
+            self.recorder.end(self.match, reason)
+        self.match.clear()
+
     def before_message(self) -> None:
         """Do what is due before a message is handled."""
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.step_result import StepResult
+from marl_airhockey.world.world import World
 
 RATE = 60
 """Ticks, and control steps, per second."""
@@ -52,9 +54,8 @@ class LiveMatch:
     ) -> None:
         usual: Keywords = {"control_dt": self.CONTROL_DT}
         self.keywords: Keywords = {**usual, **keywords}
-        # Policies of any form can take a seat at any time; none of the zoo sees pixels.
-        forms = [form for form in OBSERVE if form != "pixels"]
-        self.world = build_world(scenario, 1, False, self.keywords, forms)
+        self._scenario, self._rules = scenario, self.keywords
+        self.world = self._build()
         agents = [f"paddle_{i}" for i in range(len(self.seats))]
         for agent in drivers:
             if agent not in agents:
@@ -93,6 +94,19 @@ class LiveMatch:
         return self.world.scene.seats
 
     @property
+    def has_rivals(self) -> bool:
+        """True if people play against programs."""
+        rows = list(zip(self.seats, self.drivers.names, strict=True))
+        people = {seat.team for seat, name in rows if name == PERSON}
+        programs = {seat.team for seat, name in rows if name != PERSON}
+        return bool(people and programs - people)
+
+    @property
+    def _decided_by(self) -> str:
+        memory = {name: value[0] for name, value in self.world.memory.items()}
+        return self.world.scenario.decided_by(memory)
+
+    @property
     def winners(self) -> list[int]:
         """Seats that meet the scenario's criterion of success."""
         return np.flatnonzero(self.world.episode.success[0]).tolist()
@@ -107,10 +121,25 @@ class LiveMatch:
             raise ValueError("seats change between matches")
         self.drivers.set(i, name)
         if self.phase == "done":
-            self._next_episode()
-            self.phase, self.reason = "lobby", ""
+            self.clear()
         else:
             self.drivers.reset([i])
+
+    def substitute(self, i: int) -> None:
+        """Let a program take over a seat, in a match too: a fitting policy or a script.
+
+        Raises:
+            ValueError: It does not fit.
+        """
+        self.drivers.set(i, next(iter(self.drivers.fitting_policies), "allround"))
+        self.drivers.reset([i])
+
+    def clear(self) -> None:
+        """End the match that runs, and forget the last one: a fresh lobby."""
+        self.abort("cleared")
+        if self.phase == "done":
+            self._next_episode()
+            self.phase, self.reason = "lobby", ""
 
     def set_handicap(self, handicap: Handicap) -> None:
         """Limit all programs, from the next match on.
@@ -143,10 +172,41 @@ class LiveMatch:
         if self.phase == "pause":
             self.phase, self.time_left = "countdown", max(self.time_left, RESUME)
         elif self.phase in ("lobby", "done"):
+            self._use(self._rules)
             if self.phase == "done":
                 self._next_episode()
             self.phase, self.time_left = "countdown", COUNTDOWN
         self.reason = ""
+
+    @property
+    def offers_golden_goal(self) -> bool:
+        """True after a game that ended with as many goals for either team."""
+        over = self.phase == "done" and not self.reason
+        names = [field.name for field in fields(self.world.scenario)]
+        return over and "goals_to_win" in names and self._decided_by != "goals"
+
+    def start_golden_goal(self) -> None:
+        """Begin a match that the next goal decides, with a countdown."""
+        if self.offers_golden_goal:
+            options = {**self._rules.get("options", {}), "goals_to_win": 1}
+            self._use({**self._rules, "options": options})
+            self._next_episode()
+            self.phase, self.time_left = "countdown", COUNTDOWN
+
+    def _use(self, keywords: Keywords) -> None:
+        """Play by the rules of keywords from the next episode on."""
+        if keywords != self.keywords:
+            self.world.close()
+            self.keywords = keywords
+            self.world = self._build()
+            self.world.seed(None)
+            self.drivers.enter(self.world)
+            self._next_episode()
+
+    def _build(self) -> World:
+        # Policies of any form can take a seat at any time; none of the zoo sees pixels.
+        forms = [form for form in OBSERVE if form != "pixels"]
+        return build_world(self._scenario, 1, False, self.keywords, forms)
 
     def pause(self, reason: str = "") -> None:
         """Pause a running match."""
@@ -187,6 +247,8 @@ class LiveMatch:
             "time_left": round(self.time_left, 2),
             **self._drawn(),
             "reason": self.reason,
+            "golden_goal": self.keywords != self._rules,
+            "offers_golden_goal": self.offers_golden_goal,
             "events": self.events,
         }
 

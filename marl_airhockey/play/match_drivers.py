@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable
 from functools import cached_property
 
@@ -10,7 +11,7 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.play.handicap import Handicap
-from marl_airhockey.policies.load import ZOO
+from marl_airhockey.policies.load import ZOO, policy_file
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import (
     make_agent,
@@ -67,6 +68,15 @@ class MatchDrivers:
             ]
         return [*self.fitting_policies, *scripts]
 
+    @property
+    def digests(self) -> list[str]:
+        """First 16 hexadecimal digits of the SHA-256 of each seat's policy; "" else."""
+        files = [policy_file(name.partition(":")[0]) for name in self.names]
+        return [
+            hashlib.sha256(file.read_bytes()).hexdigest()[:16] if file.is_file() else ""
+            for file in files
+        ]
+
     @cached_property
     def fitting_policies(self) -> list[str]:
         """Policies of the zoo for this game: same rules, table, seats, observations.
@@ -87,6 +97,13 @@ class MatchDrivers:
             ):
                 found.append((card["profile"] != self._profile, name))
         return [name for _, name in sorted(found)]
+
+    def enter(self, world: World) -> None:
+        """Play in another world of the same game."""
+        self._world = world
+        for seat in self._driven:
+            seat.driver.__exit__(None, None, None)
+        self._driven = [self._build(i) for i in range(len(self.names))]
 
     def set(self, i: int, name: str) -> None:
         """Give a seat to another driver; if it does not fit, the old one stays.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -12,27 +12,20 @@ from marl_airhockey.core.recording import RecordedEpisode
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
-MOVING = 0.1
-"""Speed from which a paddle counts as moving, m/s."""
 INCOMING = 0.1
 """Speed toward one's own end from which a puck counts as incoming, m/s."""
-LONGEST_REACTION = 1.5
-"""Time after a serve within which a movement counts as a reaction to it, s."""
 
 
 @dataclass
 class Player:
-    """All measurements of one player, over all episodes."""
+    """Measurements of one player, of some episodes."""
 
     name: str
     person: bool
-    won: int = 0
-    drawn: int = 0
-    lost: int = 0
+    points: list[float] = field(default_factory=list)
+    """Of each game that was played to the end: 1 if won, 0.5 if drawn, 0 if lost."""
     interceptions: list[bool] = field(default_factory=list)
     """One value for each incoming puck: True if it was hit."""
-    reactions: list[float] = field(default_factory=list)
-    """Times from a serve to the first movement, s."""
     shot_speeds: list[float] = field(default_factory=list)
     """Speeds of pucks that left the paddle toward the other end, m/s."""
     shot_placements: list[float] = field(default_factory=list)
@@ -47,12 +40,16 @@ class Player:
     @property
     def games(self) -> int:
         """Number of games that were played to the end."""
-        return self.won + self.drawn + self.lost
+        return len(self.points)
+
+    def __add__(self, other: Player) -> Player:
+        """Return both players' measurements as those of one."""
+        names = [f.name for f in fields(self) if f.name not in ("name", "person")]
+        both = {name: getattr(self, name) + getattr(other, name) for name in names}
+        return Player(self.name, self.person, **both)
 
 
-def measure(
-    player: Player, i: int, scene: Scene, episode: RecordedEpisode, dt: float
-) -> None:
+def measure(player: Player, i: int, scene: Scene, episode: RecordedEpisode) -> None:
     """Add the measurements of an episode to a player.
 
     Args:
@@ -60,7 +57,6 @@ def measure(
         i: index of the player's seat.
         scene: in which it was.
         episode: as it was recorded.
-        dt: duration of a step, s.
     """
     columns, bodies, table = episode.columns, scene.bodies, scene.table
     bound = [VIOLATIONS.index(name) for name in ("speed", "acceleration", "reach")]
@@ -74,7 +70,6 @@ def measure(
     rotation = table.rotation(scene.seats[i].side)
     position = columns["state.position"][:, bodies.puck] @ rotation.T
     velocity = columns["state.velocity"][:, bodies.puck] @ rotation.T
-    speed = np.hypot(*columns["state.velocity"][:, i].T)
     corners = np.asarray(table.vertices) @ rotation.T
     end, half = corners[:, 0].max(), corners[:, 1].max() - table.puck_radius
     for k in range(bodies.pucks):
@@ -87,7 +82,6 @@ def measure(
             offset = y + vy * (end - x) / vx
             folded = half - abs((offset + half) % (4 * half) - 2 * half)
             player.shot_placements.append(float(folded))
-        player.reactions += reactions(position[:, k], velocity[:, k], speed, dt)
 
 
 def interceptions(position: Array, velocity: Array, hits: Array) -> Iterator[bool]:
@@ -109,22 +103,3 @@ def interceptions(position: Array, velocity: Array, hits: Array) -> Iterator[boo
         elif incoming and velocity[n, 0] > INCOMING:
             incoming = False  # It came back from the wall, or was served anew.
             yield False
-
-
-def reactions(
-    position: Array, velocity: Array, speed: Array, dt: float
-) -> Iterator[float]:
-    """Yield the times, s, from serves toward a resting player to the first movement.
-
-    Args:
-        position: of the puck, (T, 2) m, ego frame.
-        velocity: of the puck, (T, 2) m/s, ego frame.
-        speed: of the player's paddle, (T,) m/s.
-        dt: duration of a step, s.
-    """
-    jumped = np.hypot(*np.diff(position, axis=0, prepend=position[:1] + 1.0).T) > 0.1
-    central = np.hypot(*position.T) < 0.15
-    for n in np.flatnonzero(jumped & central & (velocity[:, 0] < -INCOMING)):
-        after = speed[n : n + round(LONGEST_REACTION / dt)]
-        if after[0] < MOVING and (after >= MOVING).any():
-            yield float(np.argmax(after >= MOVING) * dt)

@@ -45,6 +45,7 @@ def drawn(
             for m in scenario.all_marks(state, memory)
         ],
         "caption": scenario.caption(memory),
+        "decided_by": scenario.decided_by(memory),
         "returns": rounded(returns),
         "success": np.flatnonzero(success).tolist(),
         "eliminated": [] if eliminated is None else np.flatnonzero(eliminated).tolist(),

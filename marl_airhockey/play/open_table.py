@@ -55,8 +55,9 @@ class OpenTable(Host):
     def __init__(self, seats: Seats, recorder: Recorder | None, plant: Plant) -> None:
         super().__init__(seats)
         self._recorder, self.plant = recorder, plant
-        self._reserved: dict[str, tuple[int, float]] = {}
-        """Seat, and time until which it is reserved, by key of a page."""
+        self._left: dict[int, tuple[str, float]] = {}
+        """Key of the page that had a free seat last, and the time until which the seat
+        is reserved for it, by seat."""
         self._handlers: dict[str, Handler] = {
             "hello": self._hello,
             "aim": seats.aim,
@@ -64,6 +65,8 @@ class OpenTable(Host):
             "start": self._start,
             "pause": self._pause,
             "stop": self._stop,
+            "substitute": self._substitute,
+            "golden_goal": self._golden_goal,
             "swap": self._swap,
             "sit": self._sit,
             "leave": self._leave,
@@ -91,27 +94,44 @@ class OpenTable(Host):
 
     def disconnected(self, client: Client) -> None:
         """Free the seat of a page that has gone, and reserve it for `GRACE`."""
-        if client.seat is not None and client.key:
-            self._reserved[client.key] = (client.seat, time.monotonic() + GRACE)
-        super().disconnected(client)
+        if client.seat is not None:
+            self._free(client, GONE, time.monotonic() + GRACE)
 
     def check_presence(self, now: float) -> None:
-        """Free the seats of idle pages, and drop reservations that have expired."""
+        """Free the seats of idle pages; clear a table that everybody has left."""
         for client in self.seats.clients:
             if self.seats.is_idle(client, now):
-                self.seats.leave(client, "a player has been idle")
-        self._reserved = {k: v for k, v in self._reserved.items() if v[1] > now}
+                self._free(client, "a player has been idle", now)
+        people = self.match.drivers.names.count(PERSON)
+        reserved = any(until > now for _, until in self._left.values())
+        if people and len(self.seats.free) == people and not reserved:
+            self._left.clear()
+            if self.match.phase != "lobby":
+                self.clear_table("everybody has left")
+
+    def _free(self, client: Client, reason: str, until: float) -> None:
+        """Free the seat of a page, which may come back to it."""
+        assert client.seat is not None
+        self._left[client.seat] = client.key, until
+        self.seats.leave(client, reason)
+
+    def _take(self, client: Client, seat: int) -> None:
+        """Give a page a seat; somebody new finds no match of others there."""
+        last, _ = self._left.pop(seat, ("", 0.0))
+        if last != client.key and self.match.phase != "lobby":
+            self.clear_table("the players changed")
+        self.seats.take(client, seat)
 
     def _hello(self, client: Client, key: str) -> None:
-        seats = self.seats
+        seats, now = self.seats, time.monotonic()
         client.key, client.name = key, hashlib.sha256(key.encode()).hexdigest()[:8]
-        seat, _ = self._reserved.pop(key, (None, 0.0))
-        if seat is not None and seat in seats.free:
-            seats.take(client, seat)
+        nobody = "", 0.0
+        own = [i for i in seats.free if self._left.get(i, nobody)[0] == key]
+        open_ones = [i for i in seats.free if self._left.get(i, nobody)[1] <= now]
+        if client.seat is None and (own or open_ones):
+            self._take(client, [*own, *open_ones][0])
             if self.match.reason == GONE and not seats.free:
                 self.match.start()
-        elif client.seat is None and seats.free:
-            seats.take(client, seats.free[0])
 
     def _start(self, client: Client) -> None:
         if self.seats.may_control(client) and not self.seats.free:
@@ -124,6 +144,19 @@ class OpenTable(Host):
     def _stop(self, client: Client) -> None:
         if self.seats.may_control(client):
             self.match.abort("broken off by a player")
+
+    def _substitute(self, client: Client) -> None:
+        """Let programs take over the seats that people have left, and go on."""
+        if client.seat is None or self.match.phase != "pause":
+            return
+        for seat in self.seats.free:
+            self.match.substitute(seat)
+        self._left.clear()
+        self.match.start()
+
+    def _golden_goal(self, client: Client) -> None:
+        if self.seats.may_control(client) and not self.seats.free:
+            self.match.start_golden_goal()
 
     @property
     def _between_matches(self) -> bool:
@@ -139,16 +172,17 @@ class OpenTable(Host):
         for other in self.seats.clients:
             if other.seat is not None:
                 other.seat = (other.seat + 1) % len(names)
+        self._left.clear()
 
     def _sit(self, client: Client, seat: int) -> None:
         if seat in self.seats.free:
             if client.seat is not None:
-                self.seats.leave(client, "a player has changed seats")
-            self.seats.take(client, seat)
+                self._free(client, "a player has changed seats", 0.0)
+            self._take(client, seat)
 
     def _leave(self, client: Client) -> None:
         if client.seat is not None:
-            self.seats.leave(client, "a player has left")
+            self._free(client, "a player has left", 0.0)
 
     def _opponent(self, client: Client, seat: int, name: str) -> None:
         drivers, taken = self.match.drivers, [c.seat for c in self.seats.clients]

@@ -17,18 +17,18 @@ MOST = 4
 
 
 def plot_report(report: Report, path: Path) -> None:
-    """Write a PNG of scores, reactions, speed and placement of shots."""
+    """Write a PNG of scores, round trips, speed and placement of shots."""
     ranked = sorted(report.players.values(), key=lambda p: (not p.person, -p.games))
     shown = list(zip(ranked, (INK, *INKS), strict=False))[:MOST]
     figure, grid = plt.subplots(2, 2, figsize=(9, 6), dpi=DPI, layout="constrained")
     _scores(grid[0, 0], report)
     panels = (
-        (grid[0, 1], "reactions", "ms from a serve to the first movement", 1000.0),
-        (grid[1, 0], "shot_speeds", "speed of shots, m/s", 1.0),
-        (grid[1, 1], "shot_placements", "offset at which shots would arrive, m", 1.0),
+        (grid[0, 1], "delays", "round trip of the page, ms"),
+        (grid[1, 0], "shot_speeds", "speed of shots, m/s"),
+        (grid[1, 1], "shot_placements", "offset at which shots would arrive, m"),
     )
-    for axes, name, label, scale in panels:
-        _distributions(axes, name, label, scale, shown)
+    for axes, name, label in panels:
+        _distributions(axes, name, label, shown)
     save(figure, path)
 
 
@@ -50,13 +50,12 @@ def _distributions(
     axes: Axes,
     name: str,
     label: str,
-    scale: float,
     players: list[tuple[Player, str]],
 ) -> None:
     """Draw the cumulative distributions of a field of `Player`."""
     drawn = False
     for player, ink in players:
-        values = scale * np.sort(getattr(player, name))
+        values = np.sort(getattr(player, name))
         if len(values) < 2:
             continue
         share = (np.arange(len(values)) + 0.5) / len(values)

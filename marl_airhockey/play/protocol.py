@@ -12,13 +12,33 @@ RATE_LIMIT = 240.0
 """Messages per second that a page may send on average."""
 BURST = 480.0
 """Messages that a page may send at once."""
+LONGEST = 800
+"""Most characters of a text."""
+
+
+class Text(str):
+    """Text of at most `LONGEST` characters, which may be empty."""
+
+    __slots__ = ()
+
+
 MESSAGES: dict[str, dict[str, type]] = {
     "hello": {"key": str},
+    "seen": {"f": int},
+    "device": {
+        "input": str,
+        "width": int,
+        "height": int,
+        "density": float,
+        "hz": float,
+    },
     "aim": {"x": float, "y": float, "held": int, "q": int, "rtt": float},
     "stick": {"x": float, "y": float, "q": int, "rtt": float},
     "start": {},
     "pause": {},
     "stop": {},
+    "substitute": {},
+    "golden_goal": {},
     "swap": {},
     "sit": {"seat": int},
     "leave": {},
@@ -27,6 +47,7 @@ MESSAGES: dict[str, dict[str, type]] = {
     "fault": {"name": str, "on": int},
     "consent": {"version": str},
     "answer": {"question": str, "value": int},
+    "comment": {"question": str, "text": Text},
     "withdraw": {},
     "next": {},
 }
@@ -36,7 +57,9 @@ MESSAGES: dict[str, dict[str, type]] = {
 tilt along the axes of the table frame for ``stick``. ``held`` is 1 while a button or a
 finger is down: a real arm moves only then. ``q`` counts the aims of a page;
 ``rtt`` is the time, ms, that it measured between an aim and the frame that shows it.
-The last four kinds belong to studies.
+``device`` tells what a person steers by, the size of the window and the pixels of the
+screen a pixel of it, and the pictures a second. ``seen`` acknowledges a frame by its
+number, and all before it. The last five kinds belong to studies.
 """
 
 
@@ -70,6 +93,10 @@ def _refuse(name: str) -> None:
 
 def _check(name: str, value: Any, kind: type) -> Any:
     """Return a field's value as its type; raise ValueError if it has another."""
+    if kind is Text:
+        if not isinstance(value, str) or len(value) > LONGEST:
+            raise ValueError(f"{name}: must be at most {LONGEST} characters")
+        return value
     if kind is str:
         if not isinstance(value, str) or not 0 < len(value) <= 80:
             raise ValueError(f"{name}: must be 1 to 80 characters")

@@ -128,6 +128,16 @@ class RealMatch(LiveMatch):
             # Nobody presses a button after a stop but to begin again.
             self.again = False
 
+    def clear(self) -> None:
+        """Forget the last episode; of one that runs, do no more than end it.
+
+        Another thread may still wait for the arm or for people.
+        """
+        if self.phase == "done":
+            super().clear()
+        else:
+            self.abort("the players changed")
+
     def ask(self, words: str) -> None:
         """Show words to the people at the pages; return when one of them agrees.
 

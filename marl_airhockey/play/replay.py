@@ -51,11 +51,18 @@ def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
         "meta": {
             "match": description(scenario, seconds),
             "control_dt": head["control_dt"],
-            "players": head.get("players", []),
+            "players": _players(head),
         },
         "steps": steps,
         "end": {"reason": episode.reason, "steps": len(episode)},
     }
+
+
+def _players(head: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the rows of players; none if they make no sense."""
+    rows = head.get("players")
+    listed = isinstance(rows, list) and all(isinstance(row, dict) for row in rows)
+    return rows if isinstance(rows, list) and listed else []
 
 
 def frames_of(episode: RecordedEpisode, scenario: Scenario) -> list[dict[str, Any]]:
@@ -70,6 +77,9 @@ def frames_of(episode: RecordedEpisode, scenario: Scenario) -> list[dict[str, An
         state = states.map(lambda x, n=n: x[n])  # type: ignore[misc]
         memory = {name: value[n] for name, value in memories.items()}
         row = drawn(scenario, state, memory, returns[n], success[n])
-        notes = {"phase": "play", "n": n, "time_left": 0.0, "reason": ""}
+        notes = {
+            **{"phase": "play", "n": n, "time_left": 0.0, "reason": ""},
+            **{"golden_goal": False, "offers_golden_goal": False},
+        }
         frames.append({**notes, **row, "events": events(state) if n else []})
     return frames

@@ -1,40 +1,80 @@
-"""Report of recordings, by player: results, reactions, shots, limits."""
+"""Report of recordings, by player: results, shots, limits."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, reduce
+from operator import add
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import META, PLAYED, RecordedEpisode
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.data.columns import scenario_of
-from marl_airhockey.data.reader import read_head, read_recording
-from marl_airhockey.evaluation.stats import bootstrap, elo, interval, iqm
-from marl_airhockey.play.handicap import Handicap
-from marl_airhockey.play.measures import MOVING, Player, measure
+from marl_airhockey.evaluation.stats import (
+    FEWEST_GROUPS,
+    elo,
+    interval,
+    iqm,
+    jackknife,
+    without_nan,
+)
+from marl_airhockey.play.cells import markdown, number, shown
+from marl_airhockey.play.games import Game, read_games
+from marl_airhockey.play.measures import Player
 from marl_airhockey.types import Array
 
-RESAMPLES = 400
-"""Bootstrap resamples of an interval."""
-FEWEST = 5
-"""Games from which an Elo has an interval: fewer have too often all the same result."""
+MOST_GROUPS = 60
+"""Most groups of games that an interval of programs alone is made of"""
+NAN = float("nan")
+HEADER = (
+    *("player", "games", "people", "score (95 %)", "Elo (95 %)", "pucks hit (95 %)"),
+    *("shots", "shot, m/s (95 %)", "spread of shots, m", "at limits", "round trip, ms"),
+)
+LEGEND = (
+    "Score: win + draw / 2, of games played to the end. Shots: pucks that left the "
+    "paddle toward the other end; their interquartile mean speed, and the deviation of "
+    "where they would reach that end. At limits: share of the steps whose action "
+    "exceeded speed, acceleration or reach. Intervals of a program are over the people "
+    "that it met, as the games of a person are not independent; those of a person, and "
+    f"of programs among themselves, over games; none of fewer than {FEWEST_GROUPS}."
+)
 
 
 @dataclass
 class Report:
     """Measurements of all players, and the games between them."""
 
-    players: dict[str, Player]
-    """Measurements by the player's name."""
-    games: list[tuple[str, str, float]]
-    """Rows (player, other player, score of the first: 1, 0.5 or 0)."""
-    episodes: int
-    broken_off: int
+    games: list[Game]
+    skipped: list[str] = field(default_factory=list)
+    """A line for each file that was skipped."""
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes."""
+        return sum(game.episodes for game in self.games)
+
+    @property
+    def broken_off(self) -> int:
+        """Number of episodes that were not played to the end."""
+        return sum(game.broken_off for game in self.games)
+
+    @cached_property
+    def _groups(self) -> dict[str, list[Player]]:
+        """Measurements by player, in groups that are independent of each other."""
+        found: dict[str, dict[object, Player]] = {}
+        for game in self.games:
+            for player in game.players:
+                unit = game.path if player.person else game.people or game.path
+                own = found.setdefault(player.name, {})
+                own[unit] = own[unit] + player if unit in own else player
+        return {name: _merged(list(own.values())) for name, own in found.items()}
+
+    @cached_property
+    def players(self) -> dict[str, Player]:
+        """Measurements by the player's name."""
+        return {name: reduce(add, groups) for name, groups in self._groups.items()}
 
     def rows(self) -> list[dict[str, Any]]:
         """Return a row for each player, those with most games first.
@@ -43,201 +83,144 @@ class Report:
         """
         ratings = self._ratings()
         ranked = sorted(self.players.values(), key=lambda p: (-p.games, p.name))
-        return [
-            {
-                "player": p.name,
-                "person": p.person,
-                "games": p.games,
-                "score": _share(p.won + 0.5 * p.drawn, p.games),
-                "elo": ratings.get(p.name, [float("nan")] * 3),
-                "hit_rate": _share(sum(p.interceptions), len(p.interceptions)),
-                "reaction_ms": [1000 * x for x in _middle(p.reactions)],
-                "shot_speed": _middle(p.shot_speeds),
-                "shot_spread": _spread(p.shot_placements),
-                "limited": _share(p.limited, p.steps)[0],
-                "round_trip_ms": _middle(p.delays)[0],
-            }
-            for p in ranked
-        ]
+        return [self._row(player, ratings) for player in ranked]
+
+    def _row(self, p: Player, ratings: dict[str, list[float]]) -> dict[str, Any]:
+        groups = self._groups[p.name]
+        met = {
+            name
+            for game in self.games
+            if p.name in [player.name for player in game.players]
+            for name in game.people
+        }
+        return {
+            "player": p.name,
+            "person": p.person,
+            "games": p.games,
+            "people": len(met),
+            "score": share([group.points for group in groups]),
+            "elo": ratings.get(p.name, [NAN] * 3),
+            "hit_rate": share([group.interceptions for group in groups]),
+            "shots": len(p.shot_speeds),
+            "shot_speed": middle([group.shot_speeds for group in groups], iqm),
+            "shot_spread": float(np.std(p.shot_placements or NAN)),
+            "limited": p.limited / p.steps if p.steps else NAN,
+            "round_trip_ms": iqm(np.array(p.delays)) if p.delays else NAN,
+        }
 
     def _ratings(self) -> dict[str, list[float]]:
-        """Return the Elo of each player with its 95 % interval, games resampled."""
-        names = sorted({name for a, b, _ in self.games for name in (a, b)})
+        """Return the Elo of each player with its 95 % interval."""
+        units: dict[object, list[tuple[str, str, float]]] = {}
+        for game in self.games:
+            if game.pairs:
+                units.setdefault(game.people or game.path, []).extend(game.pairs)
+        groups = _split(list(units.values()))
+        names = sorted(
+            {name for game in self.games for p in game.pairs for name in p[:2]}
+        )
         if len(names) < 2:
             return {}
-        rng = np.random.default_rng(0)
-        count = len(self.games)
 
-        def rate(chosen: Array) -> Array:
-            """Return the Elo of each name from some games."""
+        def rate(chosen: list[int]) -> Array:
+            """Return the Elo of each name from some groups of games."""
             score, played = np.zeros((2, len(names), len(names)))
-            for k in chosen:
-                a, b, share = self.games[k]
+            for a, b, points in (pair for k in chosen for pair in groups[k]):
                 i, j = names.index(a), names.index(b)
-                score[i, j] += share
-                score[j, i] += 1.0 - share
+                score[i, j] += points
+                score[j, i] += 1.0 - points
                 played[i, j] += 1
                 played[j, i] += 1
             return elo(score, played)
 
-        middle = rate(np.arange(count))
-        resampled = [rate(rng.integers(0, count, count)) for _ in range(RESAMPLES)]
-        low, high = np.quantile(resampled, [0.025, 0.975], axis=0)
-        enough = [sum(name in game[:2] for game in self.games) for name in names]
-        low[np.array(enough) < FEWEST] = high[np.array(enough) < FEWEST] = np.nan
+        ratings = rate(list(range(len(groups))))
+        low = high = np.full(len(names), NAN)
+        if len(groups) >= FEWEST_GROUPS:
+            low, high = jackknife(len(groups), rate)
+        enough = [
+            sum(any(name in pair[:2] for pair in group) for group in groups)
+            for name in names
+        ]
         return {
-            name: [float(middle[i]), float(low[i]), float(high[i])]
+            name: [float(ratings[i]), float(low[i]), float(high[i])]
+            if enough[i] >= FEWEST_GROUPS
+            else [float(ratings[i]), NAN, NAN]
             for i, name in enumerate(names)
         }
 
     def to_markdown(self) -> str:
         """Return a table with a legend."""
-        lines = [
-            f"# {self.episodes} recorded episodes, {self.broken_off} broken off",
-            "",
-            "| player | games | score (95 %) | Elo (95 %) | pucks hit (95 %) "
-            "| reaction, ms (95 %) | shot, m/s (95 %) | spread of shots, m "
-            "| at limits | round trip, ms |",
-            "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-        ]
-        for row in self.rows():
-            lines.append(
-                f"| {row['player']} | {row['games']} | {shown(row['score'], 2)} "
-                f"| {shown(row['elo'], 0)} | {shown(row['hit_rate'], 2)} "
-                f"| {shown(row['reaction_ms'], 0)} | {shown(row['shot_speed'], 2)} "
-                f"| {_number(row['shot_spread'], 3)} | {_number(row['limited'], 2)} "
-                f"| {_number(row['round_trip_ms'], 0)} |"
+        rows = [
+            (
+                *(row["player"], row["games"], row["people"]),
+                *(shown(row["score"], 2), shown(row["elo"], 0)),
+                *(shown(row["hit_rate"], 2), row["shots"], shown(row["shot_speed"], 2)),
+                *(number(row["shot_spread"], 3), number(row["limited"], 2)),
+                number(row["round_trip_ms"], 0),
             )
-        lines += [
-            "",
-            "Score: win + draw / 2, of games played to the end. Reaction: from a serve "
-            f"to the first movement above {MOVING} m/s. Shots: pucks that left the "
-            "paddle toward the other end; their interquartile mean speed, and the "
-            "deviation of where they would reach that end. An Elo of fewer than "
-            f"{FEWEST} games has no interval. At limits: share of the "
-            "steps whose action exceeded speed, acceleration or reach.",
+            for row in self.rows()
         ]
+        title = f"# {self.episodes} recorded episodes, {self.broken_off} broken off"
+        skipped = [f"* skipped: {line}" for line in self.skipped]
+        lines = [title, "", *markdown(HEADER, rows), "", LEGEND, *skipped]
         return "\n".join(lines) + "\n"
 
     def save(self, folder: Path) -> list[Path]:
         """Write ``report.json`` and ``report.md``; return their paths."""
         folder.mkdir(parents=True, exist_ok=True)
         files = [folder / f"report.{kind}" for kind in ("json", "md")]
-        data = {"episodes": self.episodes, "broken_off": self.broken_off}
-        rows = [{k: _plain(v) for k, v in row.items()} for row in self.rows()]
-        files[0].write_text(json.dumps({**data, "players": rows}, indent=1))
+        counts = {"episodes": self.episodes, "broken_off": self.broken_off}
+        data = {**counts, "players": self.rows(), "skipped": self.skipped}
+        files[0].write_text(json.dumps(without_nan(data), indent=1))
         files[1].write_text(self.to_markdown())
         return files
 
 
 def summarize(folder: Path, scenario: str | None = None) -> Report:
-    """Read all recordings under a folder, or those of one scenario.
-
-    Practice games of a study are left out.
+    """Return the report of all recordings under a folder, or of one scenario's.
 
     Raises:
-        ValueError: no recording, several scenarios, or a file that cannot be read.
+        ValueError: See `games.read_games`.
     """
-    if not folder.is_dir():
-        raise ValueError(f"{folder}: there is no such folder")
-    paths = [meta.parent for meta in sorted(folder.rglob(META))]
-    heads = {path: read_head(path) for path in paths}
-    heads = {p: h for p, h in heads.items() if not h.get("study", {}).get("practice")}
-    games = sorted({head["scenario"] for head in heads.values()})
-    if scenario is None and len(games) > 1:
-        raise ValueError(f"{folder} has {', '.join(games)}: choose one by --scenario")
-    chosen = [p for p, h in heads.items() if scenario in (None, h["scenario"])]
-    if not chosen:
-        what = f" of {scenario}" if scenario else ""
-        raise ValueError(f"{folder}: there are no recordings{what} in it")
-    found = Report({}, [], 0, 0)
-    for path in chosen:
-        recording = read_recording(path)
-        scene = scenario_of(recording).scene
-        for episode in recording.episodes:
-            _add(found, recording.head, scene, episode)
-    return found
+    return Report(*read_games(folder, scenario))
 
 
-def _add(
-    found: Report, head: dict[str, Any], scene: Scene, episode: RecordedEpisode
-) -> None:
-    """Add an episode to a report."""
-    players, handicap = [], head.get("handicap")
-    for row in head["players"]:
-        name = row["person"] or _program(row["driver"], handicap)
-        known = found.players.setdefault(name, Player(name, row["person"] is not None))
-        players.append(known)
-    complete = episode.reason == PLAYED
-    found.episodes += 1
-    found.broken_off += not complete
-    teams = [seat.team for seat in scene.seats]
-    if complete and len(set(teams)) > 1:
-        success = episode.columns["success"][-1]
-        won = [bool(success[i]) for i in range(len(teams))]
-        _result(found, players, teams, won)
-    if len(episode):
-        for i, player in enumerate(players):
-            measure(player, i, scene, episode, head["control_dt"])
+def _split(groups: list[list[Any]]) -> list[list[Any]]:
+    """Return at most `MOST_GROUPS` groups, of which some are joined."""
+    count = min(len(groups), MOST_GROUPS)
+    return [[x for group in groups[k::count] for x in group] for k in range(count)]
 
 
-def _program(name: str, handicap: dict[str, float] | None) -> str:
-    """Return a program's name, with its handicap if it has one."""
-    caption = Handicap(**handicap).caption if handicap else ""
-    return f"{name} ({caption})" if caption else name
+def _merged(players: list[Player]) -> list[Player]:
+    return [reduce(add, group) for group in _split([[p] for p in players])]
 
 
-def _result(
-    found: Report, players: Sequence[Player], teams: Sequence[int], won: Sequence[bool]
-) -> None:
-    """Count a game that was played to the end, for each player and each pair."""
-    anybody = any(won)
-    for i, player in enumerate(players):
-        player.won += won[i]
-        player.drawn += not anybody
-        player.lost += anybody and not won[i]
-        for j in range(i + 1, len(players)):
-            if teams[i] != teams[j] and won[i] + won[j] < 2:
-                share = 0.5 + 0.5 * (won[i] - won[j])
-                found.games.append((player.name, players[j].name, share))
+def share(groups: Sequence[Sequence[float]]) -> list[float]:
+    """Return a share with its 95 % interval, of points 0 .. 1 in groups.
+
+    Of one point a group, or if all are the same, by Wilson (1927); else by a jackknife.
+    """
+    groups = [group for group in groups if len(group)]
+    value = middle(groups, np.mean)
+    if len(groups) < FEWEST_GROUPS:
+        return value
+    means = [float(np.mean(group)) for group in groups]
+    if all(len(group) == 1 for group in groups) or len(set(means)) == 1:
+        return [value[0], *interval(value[0], len(groups))]
+    return [value[0], max(value[1], 0.0), min(value[2], 1.0)]
 
 
-def _plain(value: Any) -> Any:
-    """Return a value with None for nan, which JSON does not have."""
-    if isinstance(value, list):
-        return [_plain(x) for x in value]
-    return None if isinstance(value, float) and np.isnan(value) else value
+def middle(
+    groups: Sequence[Sequence[float]], statistic: Callable[[Array], Any]
+) -> list[float]:
+    """Return a statistic of values in groups with its 95 % interval, by a jackknife."""
+    groups = [group for group in groups if len(group)]
+    if not groups:
+        return [NAN] * 3
 
+    def of(chosen: list[int]) -> Array:
+        return np.asarray(statistic(np.concatenate([groups[k] for k in chosen])))
 
-def _share(part: float, whole: int) -> list[float]:
-    """Return a share with its 95 % interval."""
-    if not whole:
-        return [float("nan")] * 3
-    return [part / whole, *interval(part / whole, whole)]
-
-
-def _middle(values: Sequence[float]) -> list[float]:
-    """Return an interquartile mean with its 95 % interval."""
-    if not len(values):
-        return [float("nan")] * 3
-    rows = np.array(values)
-    return [iqm(rows), *bootstrap(rows, iqm, resamples=RESAMPLES)]
-
-
-def _spread(values: Sequence[float]) -> float:
-    """Return the standard deviation; nan for no values."""
-    return float(np.std(values)) if len(values) else float("nan")
-
-
-def _number(value: float, digits: int) -> str:
-    return "-" if np.isnan(value) else f"{value:.{digits}f}"
-
-
-def shown(values: Sequence[float], digits: int) -> str:
-    """Return a value with its interval, if it has one, as text; "-" for nan."""
-    middle, low, high = values
-    if np.isnan(middle):
-        return "-"
-    if np.isnan(low):
-        return f"{middle:.{digits}f}"
-    return f"{middle:.{digits}f} ({low:.{digits}f}..{high:.{digits}f})"
+    if len(groups) < FEWEST_GROUPS:
+        return [float(of(list(range(len(groups))))), NAN, NAN]
+    low, high = jackknife(len(groups), of)
+    return [float(of(list(range(len(groups))))), float(low), float(high)]

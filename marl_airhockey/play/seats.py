@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
+import numpy as np
+
+from marl_airhockey.core.recording import Columns
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
@@ -48,13 +51,24 @@ class Seats:
         return rows
 
     @property
-    def delays(self) -> list[float | None]:
-        """Round trip of the page at each seat, ms; None where it is unknown."""
-        found: list[float | None] = [None] * len(self.match.seats)
+    def devices(self) -> list[dict[str, Any] | None]:
+        """What the page at each seat says of its devices; None for programs."""
+        found = {c.seat: c.device for c in self.clients}
+        return [found.get(i) for i in range(len(self.match.seats))]
+
+    @property
+    def columns(self) -> Columns:
+        """Columns of a recording: what pages do now, by seat; nan where it is unknown.
+
+        ``round_trip`` (seats,), ms; ``pointer`` (seats, 2), last aim, table frame, m.
+        """
+        seats = len(self.match.seats)
+        trips, pointers = np.full(seats, np.nan), np.full((seats, 2), np.nan)
         for client in self.clients:
             if client.seat is not None:
-                found[client.seat] = client.round_trip
-        return found
+                trips[client.seat] = client.round_trip or np.nan
+                pointers[client.seat] = client.pointer
+        return {"round_trip": trips, "pointer": pointers}
 
     def may_control(self, client: Client) -> bool:
         """Return True for pages with a seat, and for all if only programs play."""

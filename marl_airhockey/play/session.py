@@ -14,7 +14,7 @@ from marl_airhockey.play.host import Host
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.protocol import parse
 from marl_airhockey.play.real_match import RealMatch
-from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.play.recorder import Recorder, Table
 
 BEHIND = 6
 """Ticks that the loop makes up for when it is late; more are skipped."""
@@ -35,6 +35,7 @@ class Session:
         """Ticks a second, over the last second."""
         self._recorded: list[dict[str, Any]] = []
         """Value of `Seats.players` when the recording of this episode began."""
+        self._frames = 0
         self.failure: BaseException | None = None
         """Exception that ended the loop, if one did."""
 
@@ -70,9 +71,13 @@ class Session:
         client.limiter.acquire(time.monotonic())
         kind, fields = parse(text)
         handlers = self.host.handlers
-        if kind not in handlers:
+        if kind == "seen":
+            client.link.acknowledge(fields["f"], time.monotonic())
+        elif kind == "device":
+            client.device = fields
+        elif kind not in handlers:
             raise ValueError(f"{kind}: not at this table")
-        if not client.watches:
+        elif not client.watches:
             handlers[kind](client, **fields)
 
     def describe(self) -> dict[str, Any]:
@@ -125,23 +130,26 @@ class Session:
         match, players = self.match, self._seats.players
         if moved and match.ticks == 1:
             self._recorded = players
-            recorder.begin(match, self._recorded)
+            recorder.begin(match, Table(players, self._seats.devices))
         if moved and players != self._recorded:
             recorder.end(match, "the players changed")
         elif moved:
-            recorder.step(match, self._seats.delays)
+            recorder.step(match, **self._seats.columns)
         if match.phase == "done":
             recorder.end(match, match.reason or PLAYED)
 
     def _broadcast(self) -> None:
         """Give every page a new frame; one that was not sent in time is dropped."""
         status = {**self._status(), **self.host.status()}
-        shared = {"t": "state", **self.match.state(), **status}
+        self._frames += 1
+        shared = {"t": "state", "f": self._frames, **self.match.state(), **status}
         text = json.dumps(shared, separators=(",", ":"))[:-1]
         for client in self.clients:
-            fields = {"seat": client.seat, "ack": client.acknowledged}
+            link = {"rate": client.link.rate, "ms": round(1e3 * client.link.delay)}
+            fields = {"seat": client.seat, "ack": client.acknowledged, "link": link}
             own = {**fields, **self.host.own_fields(client)}
             client.frame = f"{text},{json.dumps(own, separators=(',', ':'))[1:]}"
+            client.frame_number = self._frames
             client.frame_ready.set()
 
     def _status(self) -> dict[str, Any]:
@@ -158,6 +166,6 @@ class Session:
             "troubles": [*drivers.troubles, *film],
             "watching": sum(client.seat is None for client in self.clients),
             "rate": round(self.rate, 1),
-            "recording": recorder is not None
-            and self.match.phase in ("countdown", "play", "pause"),
+            "recording": recorder is not None and recorder.runs,
+            "not_recorded": recorder.failure if recorder is not None else "",
         }

@@ -14,6 +14,17 @@ ZOO = Path(__file__).parents[1] / "zoo"
 """Folder of the trained policies that come with the library"""
 
 
+def policy_file(path: str | Path) -> Path:
+    """Return the file of a policy, of a run's folder or of ``zoo/NAME``."""
+    path = Path(path)
+    if path.parent == Path("zoo") and not path.exists():
+        path = ZOO / f"{path.name}.npz"
+    if path.is_dir():
+        kept = policies_of(path)
+        path = next((file for file in kept if file.exists()), kept[0])
+    return path
+
+
 def load_policy(
     path: str | Path, deterministic: bool = True, trust: bool | None = None
 ) -> Policy:
@@ -33,12 +44,7 @@ def load_policy(
             with pickled Python that is not trusted.
         RuntimeError: A missing extra; the message holds the command that installs it.
     """
-    path = Path(path)
-    if path.parent == Path("zoo") and not path.exists():
-        path = ZOO / f"{path.name}.npz"
-    if path.is_dir():
-        kept = policies_of(path)
-        path = next((file for file in kept if file.exists()), kept[0])
+    path = policy_file(path)
     if not path.exists():
         raise ValueError(f"{path}: there is no such policy file")
     if path.suffix == ".npz":

@@ -85,7 +85,10 @@ class Admission:
         if self.stage(client) != "consent" or not client.key:
             return
         role = "participant" if self.participant is None else "partner"
-        diary = Diary.begin(self.folder, role, self.plan, client.key)
+        try:
+            diary = Diary.begin(self.folder, role, self.plan, client.key)
+        except OSError as error:
+            raise ValueError(f"nothing can be saved: {error.strerror}") from error
         now = time.monotonic()
         self._erased.discard(client.key)
         if self.participant is None:
@@ -157,6 +160,7 @@ class Admission:
                 self.recorder.end(self._match, "a player has left")
         if is_participant:
             self.participant = self.recorder = None
+            self._match.clear()  # The next participant sees no score of this one.
         else:
             self.partner = None
         self.seat_people()
@@ -167,6 +171,7 @@ class Admission:
             person = self.person(client)
             if person is not None:
                 person.last_seen = now
+                person.diary.flush()
             if self._seats.is_idle(client, now):
                 self._match.pause("a player has been idle")
         self.dismiss_erased()

@@ -7,6 +7,7 @@ as an opponent has a folder ``partner-000`` with the consent alone.
 
 from __future__ import annotations
 
+import contextlib
 import datetime
 import hashlib
 import json
@@ -25,8 +26,8 @@ FORMAT = 1
 """Version of the format of diaries."""
 DIARY = "diary.jsonl"
 REPORTS = (
-    *(f"report.{kind}" for kind in ("json", "md", "png")),
-    *("games.csv", "answers.csv", "answers.md", "answers.png"),
+    *("games.csv", "answers.csv", "measures.csv", "answers.md", "answers.png"),
+    *("report.json", "report.md", "report.png"),
 )
 """Files that `airhockey data report` writes."""
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
@@ -36,6 +37,8 @@ LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 class Diary:
     """Notes on one person; every line is on the disk when `write` returns.
 
+    What a full disk does not take is kept, and written as soon as it does.
+
     Args:
         folder: of the person.
         rows: its lines so far, the head first.
@@ -43,6 +46,9 @@ class Diary:
 
     def __init__(self, folder: Path, rows: list[dict[str, Any]]) -> None:
         self.folder, self.rows = folder, rows
+        self._unwritten: list[str] = []
+        self.failure = ""
+        """Reason why the last lines are not on the disk; "" if they are."""
 
     @classmethod
     def begin(cls, study: Path, role: str, plan: Plan, page: str) -> Diary:
@@ -93,10 +99,26 @@ class Diary:
         """Add a line, with the time as ``at``."""
         now = datetime.datetime.now(datetime.UTC).isoformat()
         self.rows.append({"kind": kind, "at": now, **row})
-        with (self.folder / DIARY).open("a") as file:
-            file.write(json.dumps(self.rows[-1], separators=(",", ":")) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+        self._unwritten.append(json.dumps(self.rows[-1], separators=(",", ":")) + "\n")
+        self.flush()
+
+    def flush(self) -> None:
+        """Write the lines that are not yet on the disk."""
+        if not self._unwritten:
+            return
+        path = self.folder / DIARY
+        size = path.stat().st_size if path.exists() else 0
+        try:
+            with path.open("a") as file:
+                file.writelines(self._unwritten)
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            self.failure = error.strerror or str(error)
+            with contextlib.suppress(OSError):
+                os.truncate(path, size)  # Half a line would spoil those after it.
+            return
+        self._unwritten, self.failure = [], ""
 
 
 def page_digest(page: str) -> str:

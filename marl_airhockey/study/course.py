@@ -31,7 +31,7 @@ class Course:
         """Index of the block; -1 for practice."""
         self.game = 0
         """Number of this block's games that are over."""
-        self._answers: dict[str, int] = {}
+        self._answers: dict[str, int | str] = {}
         self._begin_block(-1 if plan.practice else 0)
         for row in list(diary.rows):
             self._replay(row)
@@ -72,6 +72,7 @@ class Course:
 
     def begin(self) -> None:
         """Begin the next game of the block."""
+        self.diary.write("begin", **self.position)
         self.stage = "match"
 
     def end_game(self, result: str, **facts: Any) -> None:
@@ -97,21 +98,38 @@ class Course:
         questions = {q.id: q for q in self.plan.questions}
         if question not in questions or not 1 <= value <= questions[question].largest:
             raise ValueError(f"answer: {question} {value} is not in the plan")
+        self._take(question, value)
+
+    def comment(self, question: str, text: str) -> None:
+        """Take an answer in words, which may be empty.
+
+        Raises:
+            ValueError: a question that the plan does not have, or not for words.
+        """
+        if question not in [q.id for q in self.plan.questions if q.free]:
+            raise ValueError(f"comment: {question} is not in the plan")
+        self._take(question, text.strip())
+
+    def _take(self, question: str, answer: int | str) -> None:
+        """Keep an answer; with the last one, write all and begin the next block."""
         if self.stage != "questions":
             return
-        self._answers[question] = value
+        self._answers[question] = answer
+        questions = {q.id: q for q in self.plan.questions}
         if self._answers.keys() < questions.keys():
             return
         position = self.position
         for name, given in self._answers.items():
             choices = questions[name].choices
+            words = isinstance(given, str)
             self.diary.write(
                 "answer",
                 block=position["block"],
                 opponent=position["opponent"],
                 question=name,
-                value=given,
-                choice=choices[given - 1] if choices else "",
+                value=None if words else given,
+                choice=choices[int(given) - 1] if choices else "",
+                text=given if words else "",
             )
         self._begin_block(self.block + 1)
 
@@ -141,6 +159,7 @@ class Course:
             self.game += 1
             self._next_stage()
         elif row["kind"] == "answer":
-            self._answers[row["question"]] = row["value"]
+            given = row["value"]
+            self._answers[row["question"]] = row["text"] if given is None else given
             if self._answers.keys() >= {q.id for q in self.plan.questions}:
                 self._begin_block(self.block + 1)

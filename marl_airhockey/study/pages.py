@@ -14,7 +14,7 @@ def texts(plan: Plan) -> dict[str, Any]:
     return {
         "title": plan.title,
         "version": plan.version,
-        "information": plan.information.strip().split("\n\n"),
+        "information": paragraphs(plan.information),
         "agree": plan.agree,
         "thanks": plan.thanks,
         "blocks": plan.blocks,
@@ -36,10 +36,18 @@ def progress(course: Course, waits: bool) -> dict[str, Any]:
         course: of the participant.
         waits: True if a person is missing at another seat.
     """
+    ended = course.stage == "end"
     return {
         "block": course.block,
         "game": course.game,
         "games": course.games,
         "time_left": round(course.time_left),
         "waits": waits,
+        # Not before: it says whom one has played against.
+        "debriefing": paragraphs(course.plan.debriefing) if ended else [],
     }
+
+
+def paragraphs(text: str) -> list[str]:
+    """Return the paragraphs of a text, which have a blank line between them."""
+    return text.strip().split("\n\n") if text.strip() else []

@@ -35,17 +35,21 @@ class Question:
     high: str = ""
     """Label of the upper end of the scale."""
     choices: tuple[str, ...] = ()
+    free: bool = False
+    """True for one that is answered in words, or not at all."""
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[a-z0-9_]+", self.id):
             raise ValueError(f"id: {self.id!r} must be of a-z, 0-9 and _")
         if len(self.choices) == 1:
             raise ValueError(f"choices: {self.id} needs at least two")
+        if self.free and (self.choices or self.low or self.high):
+            raise ValueError(f"free: {self.id} has neither choices nor a scale")
 
     @property
     def largest(self) -> int:
-        """Largest answer; the smallest is 1."""
-        return len(self.choices) or SCALE_POINTS
+        """Largest answer; the smallest is 1. 0 for one that is answered in words."""
+        return 0 if self.free else len(self.choices) or SCALE_POINTS
 
 
 QUESTIONS = {
@@ -124,6 +128,8 @@ class Plan:
     """Version of these texts, kept with each consent."""
     title: str = "Air hockey"
     thanks: str = "Thank you for taking part."
+    debriefing: str = ""
+    """What participants are told at the end; paragraphs with a blank line between."""
     opponents: tuple[Opponent, ...] = ()
     """Opponents, a block each; none for a scenario of one seat."""
     order: str = "balanced"

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.host import Handler, Host
 from marl_airhockey.play.live_match import RATE
@@ -56,6 +58,7 @@ class Study(Host):
             "pause": self._pause,
             "consent": self.people.consent,
             "answer": self._answer,
+            "comment": self._comment,
             "withdraw": self.people.withdraw,
             "next": self.people.next_person,
         }
@@ -123,9 +126,17 @@ class Study(Host):
         """Note the game that is over."""
         match, recorder = self.match, self.recorder
         memory = {name: value[0] for name, value in match.world.memory.items()}
+        scenario = match.world.scenario
+        scores = {
+            name: np.ravel(counts).tolist()
+            for name, counts in scenario.scores(memory).items()
+        }
         course.end_game(
             self._result,
-            score=match.world.scenario.caption(memory),
+            rule=scenario.decided_by(memory),
+            score=scenario.caption(memory),
+            scores=scores,
+            device=self.seats.devices[PARTICIPANT_SEAT],
             seconds=round(match.ticks / RATE, 2),
             pauses=match.pauses,
             recording=recorder.path.name if recorder and recorder.path else "",
@@ -148,6 +159,12 @@ class Study(Host):
             person.course.answer(question, value)
             self.people.prepare()
 
+    def _comment(self, client: Client, question: str, text: str) -> None:
+        person = self.people.person(client)
+        if isinstance(person, Participant):
+            person.course.comment(question, text)
+            self.people.prepare()
+
     def describe(self) -> dict[str, Any]:
         """Return what a page gets once: the match and the texts of the study; JSON."""
         return {
@@ -162,7 +179,10 @@ class Study(Host):
         participant = self.people.participant
         course = participant.course if participant else None
         seats = seat_rows(course, len(self.match.seats))
-        return {"seats": seats, "handicap": ""}
+        status: dict[str, Any] = {"seats": seats, "handicap": ""}
+        if participant and participant.diary.failure:
+            status["not_recorded"] = participant.diary.failure
+        return status
 
     def own_fields(self, client: Client) -> dict[str, Any]:
         stage: dict[str, Any] = {"stage": self.people.stage(client)}

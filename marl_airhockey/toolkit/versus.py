@@ -171,8 +171,16 @@ class Versus(Scenario):
             starts.serve(rng, state, k, heading, toward[:, k] != 0.0)
         return state, memory
 
-    def caption(self, memory: Memory) -> str:
-        return "goals " + " : ".join(f"{goals:.0f}" for goals in memory["goals"])
+    def scores(self, memory: Memory) -> dict[str, Array]:
+        """Return goals, and shots on goal that were stopped, by team."""
+        return {"goals": memory["goals"], "shots": memory["stopped"]}
+
+    def decided_by(self, memory: Memory) -> str:
+        """Return "goals", or "shots on goal" in a level game; "" if both are level."""
+        for name, rule in (("goals", "goals"), ("stopped", "shots on goal")):
+            if memory[name][0] != memory[name][1]:
+                return rule
+        return ""
 
     def success(self, t: Transition) -> Array:
         """(..., seats) bool: the team leads when goals or the clock end the game.

@@ -2,11 +2,12 @@
 
     python scripts/bench/play.py --seconds 20
 
-Two cases: one player against a policy; two players and watchers (connections that take
-every frame as a page does). For each: the time from a pointer event to the picture
-that shows the server's answer, frames of state per second, the server's loop
-rate and its share of a core. Browser, watchers and server share the machine's cores,
-whose load is printed.
+Three cases: one player against a policy; two players and watchers (connections that
+take every frame as a page does); one player beside connections that never end their
+request, opened again as the server drops them. For each: the time from a pointer event
+to the picture that shows the server's answer, frames of state per second, the server's
+loop rate and its share of a core. Browser, watchers and server share the machine's
+cores, whose load is printed.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import json
 import math
 import os
 import re
+import resource
 import shutil
+import socket
 import subprocess
 import sys
 import threading
@@ -73,10 +76,46 @@ class Watchers:
         await asyncio.gather(*(self._one() for _ in range(self._count)))
 
     async def _one(self) -> None:
-        async with websockets.connect(self._address) as socket:
+        async with websockets.connect(self._address) as connection:
             with contextlib.suppress(websockets.ConnectionClosed):
                 while True:
-                    json.loads(await socket.recv())
+                    data = json.loads(await connection.recv())
+                    if data["t"] == "state" and data["f"] % 3 == 0:  # As a page does.
+                        await connection.send(json.dumps({"t": "seen", "f": data["f"]}))
+
+
+class HalfOpen:
+    """Connections that never end their request, in a thread of their own."""
+
+    def __init__(self, address: str, count: int) -> None:
+        host, port = address.removeprefix("http://").rstrip("/").split(":")
+        self._where, self._count = (host, int(port)), count
+        self.opened = 0
+        """Number of connections that were opened."""
+        if count:
+            hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+            resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+            threading.Thread(target=self._run, daemon=True).start()
+
+    def _run(self) -> None:
+        own: list[socket.socket] = []
+        while True:
+            own = [each for each in own if not self._dropped(each)]
+            with contextlib.suppress(OSError):
+                while len(own) < self._count:
+                    own.append(socket.create_connection(self._where, 1.0))
+                    own[-1].sendall(b"GET / HTTP/1.1\r\nHost: 127")
+                    own[-1].setblocking(False)
+                    self.opened += 1
+            time.sleep(0.2)
+
+    def _dropped(self, each: socket.socket) -> bool:
+        try:
+            return not each.recv(1)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
 
 def seated(browser: Browser, address: str) -> Page:
@@ -95,7 +134,10 @@ def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
         box = page.locator("#table").bounding_box()
         assert box is not None
         boxes.append(box)
-        page.evaluate("airhockey.frames.length = airhockey.latencies.length = 0")
+        page.evaluate(
+            "airhockey.frames.length = airhockey.numbers.length = "
+            "airhockey.latencies.length = 0"
+        )
     rates: list[float] = []
     rng = np.random.default_rng(0)
     began, used, events = time.perf_counter(), cpu(pid), 0
@@ -132,6 +174,7 @@ def measure(pages: list[Page], pid: int, seconds: float) -> list[str]:
 def main(
     seconds: Annotated[float, typer.Option(help="Of each case.")] = 20.0,
     watchers: Annotated[int, typer.Option(help="In the second case.")] = 20,
+    half_open: Annotated[int, typer.Option(help="In the third case.")] = 1050,
 ) -> None:
     """Measure and print."""
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -140,17 +183,14 @@ def main(
     table = Table(
         "case", "p50 ms", "p99 ms", "events", "frames/s", "loop Hz", "server", "load"
     )
-    cases: list[tuple[str, list[str], int, int]] = [
-        ("1 player", [], 1, 0),
-        (
-            f"2 players, {watchers} watchers",
-            ["--driver", "paddle_1=person"],
-            2,
-            watchers,
-        ),
+    person = ["--driver", "paddle_1=person"]
+    cases: list[tuple[str, list[str], int, int, int]] = [
+        ("1 player", [], 1, 0, 0),
+        (f"2 players, {watchers} watchers", person, 2, watchers, 0),
+        (f"1 player, {half_open} half-open connections", [], 1, 0, half_open),
     ]
     with sync_playwright() as playwright:
-        for name, options, players, crowd in cases:
+        for name, options, players, crowd, idle in cases:
             address, process = serve(*options)
             # A browser each: a page that lies behind another is drawn less often.
             browsers = [
@@ -160,9 +200,11 @@ def main(
             try:
                 pages = [seated(browser, address) for browser in browsers]
                 Watchers(address, crowd)
+                flood = HalfOpen(address, idle)
                 pages[0].keyboard.press("Space")
                 time.sleep(5.0)
-                table.add_row(name, *measure(pages, process.pid, seconds))
+                row = measure(pages, process.pid, seconds)
+                table.add_row(f"{name} ({flood.opened})" if idle else name, *row)
             finally:
                 for browser in browsers:
                     browser.close()

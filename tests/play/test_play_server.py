@@ -15,16 +15,16 @@ from command import airhockey
 from pages import aim, line, served
 
 from marl_airhockey.data.reader import read_recording
+from marl_airhockey.play.connections import listen as listen_at
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.protocol import BURST, LARGEST, RateLimiter, parse
-from marl_airhockey.play.server import listen as listen_at
 
 BAD = {
     "": "not JSON",
     "hello": "not JSON",
     "{": "not JSON",
     "[" * 900: "not JSON",
-    "[]": "t: must be one of hello, aim,",
+    "[]": "t: must be one of hello, seen,",
     "1": "t: must be one of",
     "null": "t: must be one of",
     '"aim"': "t: must be one of",
@@ -76,6 +76,12 @@ async def newest(socket, wanted="state"):
             return data
 
 
+async def collect(socket, frames):
+    while True:
+        frames.append(await newest(socket))
+        await socket.send(line("seen", f=frames[-1]["f"]))
+
+
 async def listen(socket):
     while True:
         await asyncio.wait_for(socket.recv(), 5)
@@ -117,8 +123,10 @@ def test_bad_clients_do_not_disturb_a_game():
         async with websockets.connect(url) as player:
             await player.send(line("hello", key="player"))
             await player.send(line("start"))
-            while (await newest(player))["n"] < 3:
-                pass
+            frames = []
+            reader = asyncio.create_task(collect(player, frames))
+            while not frames or frames[-1]["n"] < 3:
+                await asyncio.sleep(0.02)
             watcher = await websockets.connect(url)  # that never reads
             for i in range(200):
                 bad = await websockets.connect(url)
@@ -134,12 +142,13 @@ def test_bad_clients_do_not_disturb_a_game():
             for _ in range(50):
                 dropped = await websockets.connect(url)
                 dropped.transport.abort()
-            before = await newest(player)
+            before = frames[-1]
             await player.send(aim(-0.3, 0.1, 9))
-            while (state := await newest(player))["ack"] != 9:
-                pass
+            while (state := frames[-1])["ack"] != 9:
+                await asyncio.sleep(0.02)
             assert state["n"] > before["n"]
             assert state["phase"] == "play"
+            reader.cancel()
             watcher.transport.abort()
 
     with served("duel", "--opponent", "still", "--option", "seconds=600") as (at, _):

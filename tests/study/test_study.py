@@ -16,6 +16,7 @@ from marl_airhockey.study.admission import ABSENT
 from marl_airhockey.study.answers import read_answers
 from marl_airhockey.study.archive import diaries, erase
 from marl_airhockey.study.study import open_study
+from marl_airhockey.study.tables import by_question, save
 
 
 @pytest.fixture
@@ -66,8 +67,8 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     assert "striker" not in texts, "who is played stays with the leader"
     (found,) = diaries(out)
     assert [row["kind"] for row in found.rows] == [
-        *("diary", "consent", "game", "game", "answer", "answer"),
-        *("game", "answer", "answer", "end"),
+        *("diary", "consent", "begin", "game", "begin", "game", "answer", "answer"),
+        *("begin", "game", "answer", "answer", "end"),
     ]
     assert found.rows[1]["version"] == "3"
     metas = [read_head(path) for path in sorted(found.folder.glob("*-duel"))]
@@ -84,7 +85,7 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
         3,
         4,
     }
-    files = answers.save(tmp_path / "sums")
+    files = save(answers, tmp_path / "sums")
     assert files[0].read_text().count("\n") == 4
     assert all(path.stat().st_size > 50 for path in files)
     study.receive(client, line("next"))
@@ -205,7 +206,8 @@ def test_a_session_goes_on_after_the_server_was_cut_off(plan, tmp_path):
     answers = read_answers(out)
     assert (answers.participants, answers.complete, len(answers.answers)) == (1, 1, 4)
     assert {row["choice"] for row in answers.answers} == {"a program", ""}
-    assert {row["question"] for row in answers.table()} == {"origin: a program", "fun"}
+    asked = {row["question"] for row in by_question(answers)}
+    assert asked == {"origin: a program", "fun"}
 
 
 def test_whom_the_leader_erases_is_out(plan, tmp_path):

@@ -9,6 +9,7 @@ from study_steps import PLAN
 
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.live_match import RATE
+from marl_airhockey.study.answers import CUT_OFF, read_answers
 from marl_airhockey.study.archive import diaries
 
 
@@ -41,7 +42,9 @@ def test_killed_study_loses_less_than_a_second_of_a_game(tmp_path):
         server.kill()
         server.wait(10)
     (diary,) = diaries(out)
-    assert [row["kind"] for row in diary.rows] == ["diary", "consent"]
+    assert [row["kind"] for row in diary.rows] == ["diary", "consent", "begin"]
+    (game,) = read_answers(out).games
+    assert (game["result"], game["practice"]) == (CUT_OFF, True)
     (path,) = diary.folder.glob("*-duel")
     (episode,) = read_recording(path).episodes
     assert episode.reason == ""

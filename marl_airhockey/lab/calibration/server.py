@@ -17,30 +17,24 @@ from marl_airhockey.lab.calibration.camera_session import CameraSession
 WEB = Path(__file__).parent / "web"
 LARGEST = 512
 """Largest size of an order, bytes"""
-POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-"""Content security policy of the page"""
 
 
 def application(
-    session: CameraSession, refusal: Callable[[HTTPConnection], str | None]
+    session: CameraSession, refusal: Callable[[HTTPConnection], Response | None]
 ) -> Starlette:
     """Return the web application of a calibration.
 
     Args:
         session: Session that carries out the orders.
-        refusal: Function that returns the reason to refuse a request; None to accept.
+        refusal: Function that returns the answer to a request that is refused; None to
+            accept it.
     """
 
     async def page(request: Request) -> Response:
-        headers = {"Content-Security-Policy": POLICY}
-        return _refused(request) or FileResponse(WEB / "page.html", headers=headers)
+        return refusal(request) or FileResponse(WEB / "page.html")
 
     async def picture(request: Request) -> Response:
-        refused = _refused(request)
-        if refused is not None:
+        if refused := refusal(request):
             return refused
         try:
             packed = await asyncio.to_thread(session.picture)
@@ -50,11 +44,10 @@ def application(
 
     async def state(request: Request) -> Response:
         orders = [*session.orders]
-        return _refused(request) or JSONResponse({**session.state(), "orders": orders})
+        return refusal(request) or JSONResponse({**session.state(), "orders": orders})
 
     async def do(request: Request) -> Response:
-        refused = _refused(request)
-        if refused is not None:
+        if refused := refusal(request):
             return refused
         if int(request.headers.get("content-length", LARGEST + 1)) > LARGEST:
             return PlainTextResponse(f"an order has at most {LARGEST} bytes\n", 413)
@@ -65,10 +58,6 @@ def application(
         except (ValueError, RuntimeError, KeyError, TypeError, AttributeError) as error:
             return JSONResponse({"error": str(error)}, 400)
         return JSONResponse(session.state())
-
-    def _refused(request: Request) -> Response | None:
-        reason = refusal(request)
-        return None if reason is None else PlainTextResponse(reason + "\n", 403)
 
     routes = [
         Route("/", page),

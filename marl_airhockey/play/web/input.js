@@ -3,25 +3,49 @@
 
 // A real arm moves only while a button or a finger is down: the dead-man's switch.
 const grips = () => !match.camera || held;
+const ABOVE = 60; // px from a finger up to the paddle
+const UNSENT = 2000; // bytes that may wait to be sent when an aim is added
+// What a study needs to know of the page: by what it is steered, how large and fast it is.
+let inputKind = "", pictureRate = 0;
+function tellDevice(kind) {
+  inputKind = kind;
+  const { innerWidth: width, innerHeight: height, devicePixelRatio: density } = window;
+  send("device", { input: inputKind || "none", width, height, density, hz: Math.round(pictureRate) });
+}
+function measurePictures(count = 0, began = performance.now()) {
+  if (count === 60) { pictureRate = 60000 / (performance.now() - began); tellDevice(inputKind); return; }
+  requestAnimationFrame(() => measurePictures(count + 1, began));
+}
+function steersBy(kind) { if (kind !== inputKind) tellDevice(kind); }
+
+let byTouch = matchMedia("(pointer: coarse)").matches;
+
+// The first finger steers, and nothing else while it is down.
+function steers(event) { return event.pointerType === "touch" ? event.pointerId === finger : finger === null; }
+
+const linkRate = () => (now && now.link ? now.link.rate : 60);
 
 function aim(event) {
-  if (!fit) return;
+  if (!fit || !steers(event)) return;
   const box = canvas.getBoundingClientRect(), held_before = held;
   held = Boolean(event.buttons & 1);
   if (!grips() && !held_before) return;
-  pointer = fromScreen(event.clientX - box.left, event.clientY - box.top);
+  // A finger hides what is below it: the paddle goes above.
+  const above = event.pointerType === "touch" ? ABOVE : 0;
+  pointer = fromScreen(event.clientX - box.left, event.clientY - box.top - above);
   pointedAt = event.timeStamp;
+  steersBy(event.pointerType);
   steered = false;
   // At once, not with the next frame: that would cost a hundredth of a second.
-  if (performance.now() - sentAt > 6) sendInput(performance.now());
+  if (performance.now() - sentAt > GAP[linkRate()]) sendInput(performance.now());
 }
 
 function sendInput(at) {
-  if (!now || now.seat === null) return;
+  if (!now || now.seat === null || (socket && socket.bufferedAmount > UNSENT)) return;
   const pad = stick();
-  if (pad) { steered = true; pointer = null; sentAt = at; send("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: roundTrip || 0 }); pending.set(aimed, at); return; }
+  if (pad) { steersBy(pressed.size ? "keys" : "gamepad"); steered = true; pointer = null; sentAt = at; send("stick", { x: pad[0], y: pad[1], q: ++aimed, rtt: roundTrip || 0 }); pending.set(aimed, at); return; }
   const fresh = pointedAt !== null;
-  if (!pointer || (!fresh && at - sentAt < (match.camera ? 80 : 250))) return;
+  if (!pointer || at - sentAt < (fresh ? GAP[linkRate()] : match.camera ? 80 : 250)) return;
   pending.set(++aimed, fresh ? pointedAt : at);
   predicted.push([aimed, ownPaddle ? ownPaddle.x : 0, ownPaddle ? ownPaddle.y : 0]);
   if (predicted.length > 90) predicted.shift();
@@ -51,22 +75,28 @@ addEventListener("blur", () => pressed.clear());
 
 // Raw updates come at once; others wait for the next picture.
 canvas.addEventListener("onpointerrawupdate" in window ? "pointerrawupdate" : "pointermove", aim);
-canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); aim(event); canvas.focus(); });
-function letGo() { if (held) { held = false; if (fit && match.camera && pointer) sendInput(performance.now() + 1e3); } }
-for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(kind, letGo);
+canvas.addEventListener("pointerdown", (event) => {
+  if (event.pointerType === "touch" && finger === null) finger = event.pointerId;
+  if (!steers(event)) return;
+  canvas.setPointerCapture(event.pointerId); aim(event); canvas.focus();
+});
+function letGo() { finger = null; if (held) { held = false; if (fit && match.camera && pointer) sendInput(performance.now() + 1e3); } }
+for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(kind, (event) => { if (steers(event)) letGo(); });
 addEventListener("blur", letGo);
+addEventListener("pointerdown", (event) => { byTouch = event.pointerType === "touch"; }, true);
 function toggle() {
   if (recording) { if (!recording.runs && recording.at >= recording.steps.length - 1) recording.at = 0; recording.runs = !recording.runs; return; }
   send(now && ["play", "countdown", "arrange"].includes(now.phase) ? "pause" : "start");
 }
 addEventListener("keydown", (event) => {
-  if (["SELECT", "INPUT"].includes(event.target.tagName) || event.repeat) return;
+  if (["SELECT", "INPUT", "TEXTAREA"].includes(event.target.tagName) || event.repeat) return;
   if (event.code in ARROWS) { event.preventDefault(); pressed.add(event.code); }
   if (event.code === "Space" || event.code === "Enter") { if (event.target.tagName === "BUTTON") return; event.preventDefault(); toggle(); }
   if (event.code === "KeyS" && match && !match.study) send("swap");
   if (event.code === "KeyM") $("sound").click();
 });
-$("go").onclick = () => send("start");
+$("go").onclick = () => send(deed);
+$("golden").onclick = () => send("golden_goal");
 $("pause").onclick = toggle;
 $("swap").onclick = () => send("swap");
 $("stop").onclick = () => send("stop");
@@ -77,14 +107,14 @@ $("leave").onclick = () => send("leave");
 $("withdraw").onclick = () => { leaving = true; };
 $("handicap").onchange = () => { send("handicap", { name: $("handicap").value }); $("handicap").blur(); };
 
-let audio = null;
-$("sound").onclick = () => {
-  const on = $("sound").getAttribute("aria-pressed") !== "true";
-  $("sound").setAttribute("aria-pressed", on);
-  audio = on ? new AudioContext() : null;
-};
+// On from the first tap or key: before it, browsers let no page make a sound.
+let audio = null, muted = localStorage.getItem("muted") === "yes";
+function setMuted(value) { muted = value; localStorage.setItem("muted", value ? "yes" : "no"); $("sound").setAttribute("aria-pressed", !value); }
+setMuted(muted);
+$("sound").onclick = () => setMuted(!muted);
+for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => { audio = audio || new AudioContext(); }, true);
 function beep(pitch, seconds) {
-  if (!audio) return;
+  if (!audio || muted) return;
   const tone = audio.createOscillator(), gain = audio.createGain();
   tone.frequency.value = pitch; tone.type = "triangle";
   gain.gain.setValueAtTime(0.12, audio.currentTime);

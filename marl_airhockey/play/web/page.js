@@ -9,7 +9,8 @@ function draw(at) {
     predict(dt);
     sendInput(at);
     const gap = Math.max(nowAt - beforeAt, 1);
-    const share = before ? Math.max(0, Math.min(1.2, (at - LATE - beforeAt) / gap)) : 1;
+    const late = linkRate() < 60 ? gap : LATE;
+    const share = before ? Math.max(0, Math.min(1.2, (at - late - beforeAt) / gap)) : 1;
     pen.clearRect(0, 0, canvas.width, canvas.height);
     drawTable(); drawMarks(); drawBodies(share);
     if (flash > 0) {
@@ -26,4 +27,5 @@ function draw(at) {
 
 resize();
 begin();
+measurePictures();
 requestAnimationFrame(draw);

@@ -6,6 +6,8 @@ const $ = (id) => document.getElementById(id);
 const canvas = $("table"), pen = canvas.getContext("2d");
 const SEAT = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 const LATE = 20; // ms by which others are drawn late, so that there is a frame after it
+const ACKNOWLEDGED = 45; // ms between two acknowledgements of frames
+const GAP = { 60: 6, 30: 25, 10: 70 }; // ms between two aims, by the frames a second that the link takes
 const TRAIL = 26;
 
 let match = null, now = null, before = null, nowAt = 0, beforeAt = 0;
@@ -14,36 +16,41 @@ let pointer = null, pointedAt = null, aimed = 0, sentAt = 0, roundTrip = null, f
 let ownPaddle = null; // predicted own paddle: x, y, vx, vy
 let predicted = []; // [aim, x, y] of the last aims
 let held = false; // a button or a finger is down on the table
+let finger = null; // pointerId of the finger that steers, the first one on the table
+let acknowledgedAt = 0, openedAt = 0;
 let steered = false; // by a stick or keys: nothing is predicted then
 let trails = [], fit = null, drawnAt = performance.now();
 const pending = new Map(); // aim -> time of the pointer event
-const probe = (window.airhockey = { frames: [], latencies: [], pictures: [], state: () => now });
+const probe = (window.airhockey = { frames: [], numbers: [], latencies: [], pictures: [], state: () => now });
 
 // A key of this page alone, kept over a reload, by which it gets its seat back.
-const key = sessionStorage.getItem("key") || Math.random().toString(36).slice(2) + Date.now().toString(36);
+const newKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+const key = sessionStorage.getItem("key") || newKey();
 sessionStorage.setItem("key", key);
 
 const unsent = []; // messages of clicks while there was no connection
 function send(t, fields = {}) {
   const text = JSON.stringify({ t, ...fields });
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(text);
-  else if (["consent", "answer", "withdraw", "next"].includes(t)) unsent.push(text);
+  else if (["consent", "answer", "comment", "withdraw", "next"].includes(t)) unsent.push(text);
 }
 
 function connect() {
   const scheme = location.protocol === "https:" ? "wss:" : "ws:";
   socket = new WebSocket(`${scheme}//${location.host}/ws${location.search}`);
-  socket.onopen = () => { down = false; refused = ""; send("hello", { key }); for (const text of unsent.splice(0)) socket.send(text); };
+  socket.onopen = () => { down = false; refused = ""; openedAt = performance.now(); send("hello", { key }); tellDevice(inputKind); for (const text of unsent.splice(0)) socket.send(text); };
   socket.onmessage = (event) => {
     const data = JSON.parse(event.data);
     if (data.t === "match") { match = data; trails = []; ownPaddle = null; panel = ""; resize(); openRealTable(); return; }
     receive(data);
+    if (performance.now() - acknowledgedAt > ACKNOWLEDGED) { acknowledgedAt = performance.now(); send("seen", { f: data.f }); }
   };
   socket.onclose = (event) => { down = true; refused = event.reason; setTimeout(connect, 1000); };
 }
 
 // -- A recording instead of a game --
 
+const OF_PLAYERS = ["swap", "leave", "strength", "stop", "golden"]; // controls of a live open table
 let recording = null; // { steps, at, runs }
 
 async function begin() {
@@ -56,7 +63,7 @@ async function begin() {
   recording.steps = steps.map((step) => ({ ...step, seats, seat: null, ack: 0, watching: 0, rate: 1 / meta.control_dt, recording: false }));
   $("scrub").max = steps.length - 1;
   $("timeline").hidden = false;
-  for (const name of ["swap", "leave", "handicap", "stop"]) $(name).hidden = true;
+  for (const name of OF_PLAYERS) $(name).hidden = true;
   $("scrub").oninput = () => { recording.at = Number($("scrub").value); trails = []; };
   $("scrub").onchange = () => $("scrub").blur();
   resize();
@@ -79,8 +86,8 @@ function receive(data) {
   const at = performance.now();
   if (now && data.n < now.n) trails = [];
   before = now; beforeAt = nowAt; now = data; nowAt = at;
-  probe.frames.push(at);
-  if (probe.frames.length > 5000) probe.frames.splice(0, 2500);
+  probe.frames.push(at); probe.numbers.push(data.f);
+  if (probe.frames.length > 5000) { probe.frames.splice(0, 2500); probe.numbers.splice(0, 2500); }
   data.pucks.forEach((p, i) => {
     const trail = (trails[i] = trails[i] || []);
     if (data.phase === "play") trail.push([p[0], p[1]]);

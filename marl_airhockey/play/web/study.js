@@ -28,27 +28,38 @@ const SHEETS = {
   questions() {
     const { questions } = match.study, go = button("Go on", sendAnswers), fields = questions.map(fieldOf);
     function fieldOf(question) {
+      if (question.free) {
+        const field = element("fieldset"), box = element("textarea");
+        box.name = question.id; box.maxLength = 800; box.rows = 3; box.setAttribute("aria-label", question.text);
+        field.append(element("legend", question.text), box);
+        return field;
+      }
       const field = element("fieldset"), row = element("div", "", question.choices.length ? "choices" : "scale");
       field.append(element("legend", question.text), row);
       if (question.low) row.append(element("span", question.low, "end"));
       for (let value = 1; value <= question.largest; value++) {
         const label = element("label"), dot = element("input");
         dot.type = "radio"; dot.name = question.id; dot.value = value;
-        dot.onchange = () => { go.disabled = !fields.every((f) => f.querySelector("input:checked")); };
+        dot.onchange = () => { go.disabled = !complete(); };
         label.append(dot, question.choices[value - 1] || String(value)); row.append(label);
       }
       if (question.high) row.append(element("span", question.high, "end"));
       return field;
     }
+    function complete() { return fields.every((f) => f.querySelector("textarea, input:checked")); }
     function sendAnswers() {
-      fields.forEach((f) => { const dot = f.querySelector("input:checked"); send("answer", { question: dot.name, value: Number(dot.value) }); });
+      for (const field of fields) {
+        const dot = field.querySelector("input:checked"), box = field.querySelector("textarea");
+        if (box) send("comment", { question: box.name, text: box.value });
+        else send("answer", { question: dot.name, value: Number(dot.value) });
+      }
     }
-    go.disabled = true;
+    go.disabled = !complete();
     return [element("h1", "How was it?"), ...fields, go];
   },
   end() {
     return [
-      element("h1", "That was all"), element("p", match.study.thanks), element("p", `Your code is ${now.study.code}. With it you can have your data erased later.`),
+      element("h1", "That was all"), element("p", match.study.thanks), ...now.study.debriefing.map((text) => element("p", text)), element("p", `Your code is ${now.study.code}. With it you can have your data erased later.`),
       button("Next participant", () => { send("next"); another(); }),
     ];
   },
@@ -65,7 +76,7 @@ const SHEETS = {
 
 function updateStudyWords() {
   const { stage, code } = now.study, runs = now.phase === "play" || now.phase === "countdown", sits = now.seat !== null;
-  for (const name of ["swap", "leave", "handicap", "stop"]) $(name).hidden = true;
+  for (const name of OF_PLAYERS) $(name).hidden = true;
   put($("pause"), runs ? "Pause" : "Start");
   $("pause").disabled = !sits || !(stage === "match" || (stage === "ready" && !now.study.waits));
   $("withdraw").hidden = !code;
@@ -79,6 +90,8 @@ function updateStudyWords() {
     $("sheet").hidden = !wanted; $("sheet").scrollTop = 0;
     if (wanted && now.phase === "play") send("pause");
   }
+  // Who has not begun must not see what somebody else has played.
+  document.body.classList.toggle("covered", Boolean(wanted));
   if (wanted) { $("notice").hidden = true; return; }
   const { block, game, games, time_left, waits } = now.study, where = block < 0 ? "Practice" : `Part ${block + 1} of ${match.study.blocks}`;
   if (down) show("No connection", refused || "trying again…", "");
@@ -86,9 +99,9 @@ function updateStudyWords() {
   else if (stage === "partner" && now.phase !== "play" && now.phase !== "countdown" && now.phase !== "pause") show("Please wait", "You play in a part of this session. Thank you for taking part.", "");
   else if (stage === "partner" && !sits) show("Please wait", "You play in another part of this session.", "");
   else if (stage === "rest") show("A break", `${where} begins in ${time_left} s.`, "");
-  else if (stage === "over") show(verdict(), now.reason, "");
+  else if (stage === "over") show(verdict(), why(), "");
   else if (stage === "ready" && waits) show(where, "Waiting for the other player.", "");
   else if (stage === "ready" && now.phase === "done" && game) show(verdict(), `${where}: game ${game + 1} of ${games} is next.`, "Next game");
-  else if (stage === "ready") show(where, `${match.what} ${games} ${games === 1 ? "game" : "games"}. Move the pointer to move your paddle. Space starts.`, "Start");
+  else if (stage === "ready") show(where, `${match.what} ${games} ${games === 1 ? "game" : "games"}. ${howTo()}`, "Start");
   else notice(sits, -1, stage === "match");
 }

@@ -2,20 +2,29 @@
 // Text and controls around the table.
 
 const put = (node, text) => { if (node.textContent !== text) node.textContent = text; };
-function show(headline, detail, go, bare = false) {
+let deed = "start"; // kind of the message that the button of the notice sends
+function show(headline, detail, go, bare = false, sends = "start") {
   $("notice").hidden = false; $("notice").classList.toggle("bare", bare);
   put($("headline"), headline); put($("detail"), detail); $("go").hidden = !go; put($("go"), go);
+  deed = sends;
 }
 
 function updateWords() {
-  put($("name"), match.scenario.replaceAll("_", " "));
+  const game = match.scenario.replaceAll("_", " ");
+  put($("name"), `Air hockey: ${game}${now.golden_goal ? ", the next goal wins" : ""}`);
+  if (document.title !== `Air hockey: ${game}`) document.title = `Air hockey: ${game}`;
   scoreboard();
   updateRealTable();
   put($("clock"), `${Math.max(0, match.seconds - now.time).toFixed(0)} s`);
   put($("trip"), roundTrip === null ? "" : `round trip ${roundTrip.toFixed(0)} ms`);
   put($("rate"), `loop ${now.rate.toFixed(1)} Hz`);
   put($("watching"), now.watching ? `${now.watching} watching` : "");
-  $("recording").hidden = !now.recording;
+  put($("drivers"), now.seats.map((s) => s.driver).join(", "));
+  const slow = linkRate() < 60 && performance.now() - openedAt > 3000;
+  const late = slow && now.link.ms > 50 ? `, ${(now.link.ms / 1000).toFixed(1)} s late` : "";
+  put($("link"), slow ? `slow: ${linkRate()} pictures a second${late}` : "");
+  $("recording").hidden = !now.recording && !now.not_recorded;
+  put($("recording"), now.not_recorded ? `not recorded: ${now.not_recorded}` : "● recording");
   if (recording) { updateReplayWords(); return; }
   if (match.study) { updateStudyWords(); return; }
   const runs = ["play", "countdown", "arrange"].includes(now.phase), sits = now.seat !== null;
@@ -31,26 +40,33 @@ function updateWords() {
 }
 
 function updateReplayWords() {
-  const over = now.phase === "done", ended = recording.end.reason;
+  const over = now.phase === "done";
   put($("pause"), recording.runs ? "Pause" : "Play");
   seats(-1);
-  if (over) show(verdict(), ended === "played to the end" ? "" : ended, "");
+  if (over) show(verdict(), why(), "");
   else if (flash > 0.3) show("Goal!", "", "", true);
   else $("notice").hidden = true;
 }
 
 function notice(sits, free, mayControl) {
-  $("stop").hidden = Boolean(match.study) || now.phase !== "pause" || !mayControl;
+  const alone = sits && free >= 0 && !match.camera && !match.study; // others have left
+  $("stop").hidden = Boolean(match.study) || now.phase !== "pause" || !(mayControl || alone);
+  $("golden").hidden = Boolean(match.study) || !now.offers_golden_goal || !mayControl;
   if (down) show("No connection", refused || "trying again…", "");
   else if (now.phase === "arrange") show("Getting ready", now.reason, "");
   else if (now.phase === "countdown") show(String(Math.ceil(now.time_left)), "", "", true);
-  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${match.what} Move the pointer to move your paddle. Space starts.` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
+  else if (now.phase === "lobby") show(sits ? "Ready?" : "Watching", sits && free >= 0 ? "Waiting for another player: they open this page, too." : sits ? `${match.what} ${howTo()}` : free >= 0 ? "A seat is free below." : "Waiting for the players.", mayControl ? "Start" : "");
+  else if (now.phase === "pause" && alone) show("Paused", `${sentence(now.reason)} You can wait, go on against the computer, or end the match.`, "Go on against the computer", false, "substitute");
+  else if (now.phase === "pause" && free >= 0 && !match.study) show("Paused", `${sentence(now.reason)} Who takes the free seat below begins a new match.`, "");
   else if (now.phase === "pause") show(match.camera ? "Your word" : "Paused", now.reason, mayControl ? "Go on" : "");
-  else if (now.phase === "done") show(verdict(), now.reason, mayControl ? "Again" : "");
+  else if (now.phase === "done") show(verdict(), why(), mayControl ? "Again" : "");
   else if (flash > 0.3) show("Goal!", "", "", true);
   else if (now.phase === "play" && atRest()) show("", atRest(), "", true);
   else $("notice").hidden = true;
 }
+
+const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
+const howTo = () => (byTouch ? "Drag a finger on the table: your paddle is above it." : "Move the pointer to move your paddle. Space starts.");
 
 // Why a paddle that somebody leads rests; "" if none does.
 function atRest() {
@@ -58,8 +74,17 @@ function atRest() {
   return (now.troubles || []).find(Boolean) || "";
 }
 
+const brokenOff = () => now.reason || (recording && recording.end.reason !== "played to the end" && recording.end.reason) || "";
+
+// How a result has come about, where the goals alone do not say it.
+function why() {
+  if (brokenOff() || new Set(match.seats.map((s) => s.team)).size === 1) return brokenOff();
+  if (now.decided_by === "shots on goal") return `It is level, so more shots on goal win: ${now.caption}.`;
+  return now.success.length ? "" : `Nobody is ahead: ${now.caption}.`;
+}
+
 function verdict() {
-  if (now.reason || (recording && recording.end.reason !== "played to the end")) return "Broken off";
+  if (brokenOff()) return "Broken off";
   const teams = new Set(match.seats.map((s) => s.team)), won = new Set(now.success.map((i) => match.seats[i].team));
   if (teams.size === 1) return won.size ? "Done!" : "Not this time";
   if (won.size !== 1) return "A draw";
@@ -72,7 +97,8 @@ function scoreboard() {
   const text = now.caption || `return ${now.returns[0].toFixed(1)}`;
   if (text === scored) return;
   scored = text;
-  const found = text.match(/^(\D*?)\s*(-?[\d.]+(?: : -?[\d.]+)*)$/), box = $("score");
+  const [score, ...rest] = text.split(", ");
+  const found = score.match(/^(\D*?)\s*(-?[\d.]+(?: : -?[\d.]+)*)$/), box = $("score");
   box.textContent = "";
   if (!found) { box.textContent = text; return; }
   const add = (cls, words, ink) => { const s = document.createElement("span"); s.className = cls; s.textContent = words; if (ink) s.style.color = ink; box.append(s); };
@@ -81,12 +107,23 @@ function scoreboard() {
     if (i) add("colon", ":");
     add("value", value, all.length > 1 ? SEAT[i % SEAT.length] : "");
   });
+  if (rest.length) add("word rest", rest.join(", "));
 }
 
 function titleOf(i) {
   const { driver, title } = now.seats[i];
   if (title !== undefined) return i === now.seat ? "You" : title;
-  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : driver.replace("zoo/", "policy ").replace(":strength=", ", ").replace(/^shadow:.*/, "a hand");
+  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : programTitle(driver);
+}
+
+// Names that players read; the details have those of the command line.
+function programTitle(name) {
+  if (name.startsWith("zoo/")) {
+    const kind = name.slice(4).replace(match.scenario, "").replaceAll("_", " ").trim();
+    return `Computer, trained${kind ? ` (${kind})` : ""}`;
+  }
+  const [program, strength] = name.split(":strength=");
+  return program.startsWith("shadow:") ? "A hand" : `Computer, ${program.replaceAll("_", " ")}${strength ? `, ${strength}` : ""}`;
 }
 
 let panel = "";
@@ -105,7 +142,7 @@ function seats(free) {
       const list = document.createElement("select");
       list.setAttribute("aria-label", `who plays seat ${i + 1}`);
       for (const name of [...new Set(["person", seat.driver, ...match.choices])]) {
-        const option = new Option(name === "person" ? "another person" : name.replace("zoo/", "policy ").replace(":strength=", ", "), name);
+        const option = new Option(name === "person" ? "Another person" : programTitle(name), name);
         option.selected = name === seat.driver; list.append(option);
       }
       list.onchange = () => { send("opponent", { seat: i, name: list.value }); list.blur(); panel = ""; };
@@ -119,7 +156,7 @@ function seats(free) {
 
 function handicap(canChoose) {
   const list = $("handicap"), names = [...new Set([...match.handicaps, now.handicap])];
-  list.hidden = match.camera || now.seats.every((s) => s.driver === "person");
+  $("strength").hidden = match.camera || now.seats.every((s) => s.driver === "person");
   list.disabled = !canChoose;
   if (list.options.length !== names.length) { list.textContent = ""; for (const name of names) list.append(new Option(name)); }
   if (document.activeElement !== list) list.value = now.handicap;
