@@ -40,7 +40,7 @@ class Link:
         self._flying: deque[tuple[int, float]] = deque()
         """Number and time of the frames that are not acknowledged."""
         self._delays: deque[tuple[float, float]] = deque()
-        """Time and delay of the last acknowledgements."""
+        """Time and delay of acknowledgements after which no shorter delay came."""
         self._arrivals: deque[float] = deque()
         """Times at which frames were acknowledged, of the last second."""
         self._was_late = False
@@ -54,7 +54,7 @@ class Link:
 
     @property
     def _shortest(self) -> float:
-        return min((delay for _, delay in self._delays), default=0.0)
+        return self._delays[0][1] if self._delays else 0.0
 
     def is_due(self, number: int, now: float) -> bool:
         """Return whether a frame may be sent.
@@ -88,6 +88,8 @@ class Link:
         if sent is None:
             return
         self.delay = now - sent[1]
+        while self._delays and self._delays[-1][1] >= self.delay:
+            self._delays.pop()
         self._delays.append((now, self.delay))
         while now - self._delays[0][0] > WINDOW:
             self._delays.popleft()

@@ -149,7 +149,8 @@ async def _write(socket: WebSocket, session: Session, client: Client) -> None:
             number, now = client.frame_number, time.monotonic()
             if client.link.is_due(number, now):
                 client.link.note_sent(number, now)
-                await asyncio.wait_for(socket.send_text(client.frame), STALLED)
+                async with asyncio.timeout(STALLED):
+                    await socket.send_text(client.frame)
     except (WebSocketDisconnect, RuntimeError, TimeoutError):
         with contextlib.suppress(RuntimeError):
             await socket.close(1001)

@@ -50,9 +50,8 @@ def serve(*options: str) -> tuple[str, subprocess.Popen[str]]:
         text=True,
     )
     assert process.stdout is not None
-    found = re.search(r"http://\S+", process.stdout.readline())
-    assert found is not None
-    return found[0], process
+    lines = (re.search(r"http://\S+", line) for line in process.stdout)
+    return next(filter(None, lines))[0], process
 
 
 def cpu(pid: int) -> float:

@@ -112,9 +112,12 @@ let audio = null, muted = localStorage.getItem("muted") === "yes";
 function setMuted(value) { muted = value; localStorage.setItem("muted", value ? "yes" : "no"); $("sound").setAttribute("aria-pressed", !value); }
 setMuted(muted);
 $("sound").onclick = () => setMuted(!muted);
-for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => { audio = audio || new AudioContext(); }, true);
+for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => { if (!audio) { audio = new AudioContext(); audio.suspend(); } }, true);
+let quiet = null; // timer after which the device for sound rests
 function beep(pitch, seconds) {
   if (!audio || muted) return;
+  audio.resume();
+  clearTimeout(quiet); quiet = setTimeout(() => audio.suspend(), 1500);
   const tone = audio.createOscillator(), gain = audio.createGain();
   tone.frequency.value = pitch; tone.type = "triangle";
   gain.gain.setValueAtTime(0.12, audio.currentTime);

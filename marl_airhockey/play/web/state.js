@@ -35,6 +35,13 @@ function send(t, fields = {}) {
   else if (["consent", "answer", "comment", "withdraw", "next"].includes(t)) unsent.push(text);
 }
 
+let answering = false;
+function acknowledge() {
+  if (answering) return;
+  answering = true;
+  setTimeout(() => { answering = false; acknowledgedAt = performance.now(); send("seen", { f: now.f }); }, acknowledgedAt + ACKNOWLEDGED - performance.now());
+}
+
 function connect() {
   const scheme = location.protocol === "https:" ? "wss:" : "ws:";
   socket = new WebSocket(`${scheme}//${location.host}/ws${location.search}`);
@@ -43,7 +50,7 @@ function connect() {
     const data = JSON.parse(event.data);
     if (data.t === "match") { match = data; trails = []; ownPaddle = null; panel = ""; resize(); openRealTable(); return; }
     receive(data);
-    if (performance.now() - acknowledgedAt > ACKNOWLEDGED) { acknowledgedAt = performance.now(); send("seen", { f: data.f }); }
+    acknowledge();
   };
   socket.onclose = (event) => { down = true; refused = event.reason; setTimeout(connect, 1000); };
 }
