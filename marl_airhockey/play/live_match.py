@@ -135,9 +135,13 @@ class LiveMatch:
         self.drivers.reset([i])
 
     def clear(self) -> None:
-        """End the match that runs, and forget the last one: a fresh lobby."""
+        """End the match that runs, and forget the last one: a fresh lobby.
+
+        The rules are the usual ones again, after a golden goal too.
+        """
         self.abort("cleared")
         if self.phase == "done":
+            self._use(self._rules)
             self._next_episode()
             self.phase, self.reason = "lobby", ""
 

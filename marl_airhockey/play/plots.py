@@ -14,13 +14,23 @@ from marl_airhockey.play.report import Report
 
 MOST = 4
 """Largest number of players whose distributions are drawn."""
+LINE = 0.2
+"""Height of a player's line in the panel of scores, inches."""
 
 
 def plot_report(report: Report, path: Path) -> None:
     """Write a PNG of scores, round trips, speed and placement of shots."""
     ranked = sorted(report.players.values(), key=lambda p: (not p.person, -p.games))
     shown = list(zip(ranked, (INK, *INKS), strict=False))[:MOST]
-    figure, grid = plt.subplots(2, 2, figsize=(9, 6), dpi=DPI, layout="constrained")
+    scored = sum(bool(row["games"]) for row in report.rows())
+    heights = max(3.0, LINE * scored), 3.0
+    figure, grid = plt.subplots(
+        *(2, 2),
+        figsize=(9, sum(heights)),
+        height_ratios=heights,
+        dpi=DPI,
+        layout="constrained",
+    )
     _scores(grid[0, 0], report)
     panels = (
         (grid[0, 1], "delays", "round trip of the page, ms"),

@@ -11,7 +11,6 @@ import shutil
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +23,6 @@ from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
-
-
-@dataclass(frozen=True)
-class Table:
-    """Players at a match when a recording begins."""
-
-    players: list[dict[str, Any]]
-    """Driver, person's pseudonym and consent, by seat."""
-    devices: list[dict[str, Any] | None] = field(default_factory=list)
-    """Input device, screen and pictures a second of each page, by seat."""
 
 
 class Recorder:
@@ -72,21 +61,27 @@ class Recorder:
         """True while an episode is being recorded."""
         return self._writer is not None
 
-    def begin(self, match: LiveMatch, table: Table) -> None:
+    def begin(
+        self,
+        match: LiveMatch,
+        players: list[dict[str, Any]],
+        devices: list[dict[str, Any] | None],
+    ) -> None:
         """Begin a recording.
 
         Args:
             match: Match whose first step of an episode has been made.
-            table: Players.
+            players: Driver, person's pseudonym and consent, by seat.
+            devices: Input device, screen and pictures a second of each page, by seat.
         """
         self.end(match, "cut off")
         self.failure = ""
         path = self.path = new_recording(self._folder, match.world.scenario.name)
         head = {
             **head_of(match.world, match.keywords),
-            "players": table.players,
+            "players": players,
             "policies": match.drivers.digests,
-            "devices": table.devices,
+            "devices": devices,
             "handicap": vars(match.drivers.handicap),
             "study": self.notes,
         }

@@ -14,7 +14,7 @@ from marl_airhockey.play.host import Host
 from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.protocol import parse
 from marl_airhockey.play.real_match import RealMatch
-from marl_airhockey.play.recorder import Recorder, Table
+from marl_airhockey.play.recorder import Recorder
 
 BEHIND = 6
 """Ticks that the loop makes up for when it is late; more are skipped."""
@@ -130,7 +130,7 @@ class Session:
         match, players = self.match, self._seats.players
         if moved and match.ticks == 1:
             self._recorded = players
-            recorder.begin(match, Table(players, self._seats.devices))
+            recorder.begin(match, players, self._seats.devices)
         if moved and players != self._recorded:
             recorder.end(match, "the players changed")
         elif moved:

@@ -25,11 +25,10 @@ from marl_airhockey.study.plan import Plan
 FORMAT = 1
 """Version of the format of diaries."""
 DIARY = "diary.jsonl"
-REPORTS = (
-    *("games.csv", "answers.csv", "measures.csv", "answers.md", "answers.png"),
-    *("report.json", "report.md", "report.png"),
-)
-"""Files that `airhockey data report` writes."""
+TABLES = ("games.csv", "answers.csv", "measures.csv", "answers.md", "answers.png")
+"""Files that `airhockey data report` writes of a study."""
+REPORTS = (*TABLES, "report.json", "report.md", "report.png")
+"""All files that `airhockey data report` writes."""
 LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"
 """Characters of codes; none that is mistaken for another."""
 

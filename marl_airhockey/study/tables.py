@@ -14,7 +14,7 @@ from marl_airhockey.evaluation.stats import FEWEST_GROUPS
 from marl_airhockey.play.cells import markdown, shown, write_csv
 from marl_airhockey.play.report import middle, share
 from marl_airhockey.study.answers import ANSWERS, GAMES, MEASURES, POINTS, Answers
-from marl_airhockey.study.archive import REPORTS
+from marl_airhockey.study.archive import TABLES
 from marl_airhockey.study.plan import SCALE_POINTS
 
 Row = dict[str, Any]
@@ -134,7 +134,7 @@ def save(found: Answers, folder: Path) -> list[Path]:
     from marl_airhockey.study.plot import plot_answers
 
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / name for name in REPORTS[:5]]
+    files = [folder / name for name in TABLES]
     write_csv(files[0], GAMES, found.games)
     write_csv(files[1], ANSWERS, found.answers)
     write_csv(files[2], MEASURES, found.measures())

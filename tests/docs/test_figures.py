@@ -156,6 +156,13 @@ def test_tables_of_offline_learning_are_those_of_their_rows():
     ]
 
 
+def test_what_the_paper_announces_is_that_of_its_rows(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts/reproduce")
+    header, *made = script("reproduce/announced.py")["table"]()
+    shown = table("docs/offline.md", "study", "case")
+    assert shown == [dict(zip(header, line, strict=True)) for line in made]
+
+
 def test_hindsight_is_that_of_its_rows():
     rows = {(row["task"], row["variant"]): row for row in rows_of("hindsight.csv")}
     shown = table("docs/training.md", "terminations", "success")

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from marl_airhockey.cli.main import app
 from marl_airhockey.devices.robot.limits import read_limits
 from marl_airhockey.lab.ur_controller.emulator import ScheduledFault
+from marl_airhockey.lab.ur_controller.ports import EXTERNAL_CONTROL
 
 rtde_receive = pytest.importorskip("rtde_receive")
 rtde_control = pytest.importorskip("rtde_control")
@@ -21,6 +22,20 @@ dashboard_client = pytest.importorskip("dashboard_client")
 OTHER = "127.0.0.29"
 NORMAL, PROTECTIVE = 1, 4
 """Safety status bits"""
+
+
+def external_control_is_free():
+    """Return whether the port that the client of External Control serves is free.
+
+    It is of the range that the system gives to connections of any other test.
+    """
+    with socket.socket() as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind(("", EXTERNAL_CONTROL))
+        except OSError:
+            return False
+    return True
 
 
 def test_a_client_moves_the_arm_and_meets_faults_on_demand():
@@ -128,6 +143,7 @@ def test_the_dashboard_looks_after_the_robot():
 
 def test_external_control_gets_its_script_from_the_client():
     """The constructor's arguments are those of the authors' own robot code."""
+    assert until(external_control_is_free, 30.0)
     with emulator():
         flags = rtde_control.RTDEControlInterface.FLAG_USE_EXT_UR_CAP
         control = rtde_control.RTDEControlInterface(ADDRESS, 500.0, flags)

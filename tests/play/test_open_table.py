@@ -129,7 +129,9 @@ def test_a_level_game_names_the_shots_that_decide_it_and_offers_a_golden_goal():
     state = json.loads(client.frame)
     assert (state["golden_goal"], state["decided_by"]) == (True, "goals")
     assert not state["offers_golden_goal"]
-    session.receive(client, line("start"))
+    session.receive(client, line("opponent", seat=1, name="still"))
+    assert match.phase == "lobby"
+    assert not match.state()["golden_goal"], "the next match has the usual rules"
     assert match.keywords["options"] == {"seconds": 1.0}
 
 

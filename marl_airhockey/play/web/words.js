@@ -11,7 +11,8 @@ function show(headline, detail, go, bare = false, sends = "start") {
 
 function updateWords() {
   const game = match.scenario.replaceAll("_", " ");
-  put($("name"), `Air hockey: ${game}${now.golden_goal ? ", the next goal wins" : ""}`);
+  put($("site"), "Air hockey: ");
+  put($("game"), `${game}${now.golden_goal ? ", the next goal wins" : ""}`);
   if (document.title !== `Air hockey: ${game}`) document.title = `Air hockey: ${game}`;
   scoreboard();
   updateRealTable();
