@@ -20,7 +20,7 @@ from marl_airhockey.toolkit import (
     Transition,
     observables,
     rewards,
-    starts,
+    serves,
 )
 
 
@@ -78,7 +78,7 @@ class FreeForAll(Scenario):
         state, table = self.scene.still_state(worlds), self.table_geometry
         state.paddle[:] = -0.7 * table.offsets[0] * table.normals
         first = np.floor(rng.uniform(0.0, self.sides))
-        starts.serve(rng, state, 0, self._toward(first))
+        serves.serve_all(rng, self.scene, state, self._toward(first))
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
@@ -179,7 +179,7 @@ class FreeForAll(Scenario):
     def serve(
         self, rng: RandomStreams, state: State, memory: Memory
     ) -> tuple[State, Memory]:
-        starts.serve(rng, state, 0, self._toward(memory["serve"]))
+        serves.serve(rng, self.scene, state, 0, self._toward(memory["serve"]))
         return state, memory
 
     def eliminated(self, memory: Memory) -> Array | None:

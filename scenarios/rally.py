@@ -18,7 +18,7 @@ from marl_airhockey.toolkit import (
     length,
     observables,
     rewards,
-    starts,
+    serves,
 )
 
 
@@ -54,7 +54,7 @@ class Rally(Scenario):
         state = self.scene.still_state(worlds)
         state.paddle[..., 0] = 0.7 * self.table_geometry.offsets[0] * np.array([-1, 1])
         toward = np.where(rng.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
-        starts.serve(rng, state, 0, toward)
+        serves.serve_all(rng, self.scene, state, toward)
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

@@ -13,7 +13,7 @@ from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.state import State
-from marl_airhockey.toolkit import observables, rewards, starts
+from marl_airhockey.toolkit import observables, rewards, serves
 from marl_airhockey.types import Array, Memory
 
 
@@ -46,6 +46,15 @@ class Versus(Scenario):
     """Reward of a shot on goal that was stopped; its cost for who stopped it."""
     jitter_weight: float = 0.0
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        most = serves.most_served(self.scene)
+        if self.pucks > most:
+            raise ValueError(
+                f"pucks: {self.pucks} do not fit side by side; this table has room for "
+                f"{most}"
+            )
+
     @property
     @abstractmethod
     def lineup(self) -> tuple[tuple[int, float], ...]:
@@ -76,8 +85,7 @@ class Versus(Scenario):
         for i, (side, y) in enumerate(self.lineup):
             state.paddle[:, i] = (0.7 * self.table_geometry.offsets[0] * (side - 1), y)
         toward = np.where(rng.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
-        for k in range(self.pucks):
-            starts.serve(rng, state, k, toward + k * np.pi)
+        serves.serve_all(rng, self.scene, state, toward, turn=np.pi)
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
@@ -168,7 +176,7 @@ class Versus(Scenario):
         toward = memory["serve"]
         for k in range(self.pucks):
             heading = np.where(toward[:, k] > 0.0, 0.0, np.pi)
-            starts.serve(rng, state, k, heading, toward[:, k] != 0.0)
+            serves.serve(rng, self.scene, state, k, heading, toward[:, k] != 0.0)
         return state, memory
 
     def scores(self, memory: Memory) -> dict[str, Array]:

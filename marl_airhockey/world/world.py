@@ -37,6 +37,7 @@ from marl_airhockey.world.episode import Episode, PhysicsRows
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.referee import Referee
 from marl_airhockey.world.sensed_memory import SensedMemory
+from marl_airhockey.world.placement import check_placement
 from marl_airhockey.world.set_state import checked_memory, settled
 from marl_airhockey.world.step_result import StepResult
 
@@ -297,7 +298,8 @@ class World:
 
         Raises:
             RuntimeError: before the first `reset`.
-            ValueError: a wrong shape or a number that is not finite, named.
+            ValueError: a wrong shape, a number that is not finite, or a body off the
+                table, out of its reach, in another one or too fast, named.
         """
         if self._step is None:
             self._refuse_closed("set_state")
@@ -308,8 +310,13 @@ class World:
             rng = self._streams.of("start", worlds)
             memory = self.scenario.initial_memory(rows, rng)
             memory = self._aimed(rng, rows, memory, worlds)
+        memory = checked_memory(memory, self._memory, len(worlds))
+        parked = self.scenario.eliminated(memory)
+        if parked is None:
+            parked = np.zeros((len(worlds), len(self.scene.seats)), np.bool_)
+        check_placement(rows, self.scene, parked)
         self._key_scatter(worlds)
-        self._begin(worlds, rows, checked_memory(memory, self._memory, len(worlds)))
+        self._begin(worlds, rows, memory)
         self._episode.cycles[worlds] = np.round(rows.time / self.control_dt)
         for seat in self.driven:
             seat.begin(worlds)

@@ -60,7 +60,7 @@ def test_a_goal_counts_before_a_foul_of_the_same_step(end, backend):
     seat = 0 if end < 0 else 1
     held = np.zeros((2, 2, 1))
     held[:, seat] = 4.96
-    place_puck(world, 0.93 * end, 0.0, 2.0 * end, held=held)
+    place_puck(world, 0.8 * end, 0.0, 2.0 * end, held=held)
     idle(world, 0.05)
     assert world.memory["goals"][0, 1 - seat] == 1.0
     assert (world.state.puck_velocity[:, 0, 0] * end > 0.45).all()
@@ -134,14 +134,14 @@ def test_two_goals_at_once_name_no_two_winners(backend):
     world.reset(0)
     for goals in (1, 2, 3):
         rows, kept = world.get_state()
-        rows.puck[:] = [(0.97, 0.0), (-0.97, 0.0)]
+        rows.puck[:] = [(0.8, 0.0), (-0.8, 0.0)]
         rows.puck_velocity[:] = [(3.0, 0.0), (-3.0, 0.0)]
         world.set_state(rows, kept)
         step = idle(world, world.control_dt)[0]
         assert (world.memory["goals"] == goals).all()
         assert not step.terminated.any()
         assert not world.episode.success.any()
-    place_puck(world, 0.97, 0.0, 3.0)
+    place_puck(world, 0.8, 0.0, 3.0)
     assert idle(world, world.control_dt)[0].terminated.all()
     assert world.episode.success.tolist() == [[True, False]] * 2
 
@@ -274,7 +274,7 @@ def test_a_goal_pays_who_touched_the_puck_last(backend):
     world.reset(0)
     # Seat 0 pushes the puck across to side 2, whose paddle stands aside.
     rows = world.state
-    rows.paddle[:, 0], rows.paddle[:, 2] = (-0.2, 0.0), (0.3, 0.3)
+    rows.paddle[:, 0], rows.paddle[:, 2] = (-0.2, 0.0), (0.35, 0.25)
     rows.puck[:, 0], rows.puck_velocity[:, 0] = (-0.1, 0.0), (0.0, 0.0)
     world.set_state(rows, world.memory)
     action = np.zeros((2, 4, 2))

@@ -188,3 +188,72 @@ def test_environments_take_states_too():
     one = states.map(lambda x: x[:1]), {k: v[:1] for k, v in memories.items()}
     vec.set_state(*one, worlds=np.array([2]))
     np.testing.assert_array_equal(vec.world.state.position[2], states.position[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "bodies", "words"),
+    [
+        ("duel", {"puck_0": (2.0, 0.0)}, "puck_0 is off the table, by mm: 11.."),
+        ("duel", {"puck_0": (0.0, 0.3)}, "puck_0 is off the table, by mm: 26.9"),
+        ("duel", {"puck_0": (0.9, 0.0)}, "puck_0 is off the table, by mm: 61.8"),
+        ("duel", {"puck_1": (0.0, -0.06)}, "puck_0 and puck_1 overlap, by mm: 63.5"),
+        ("duel", {"paddle_0": (0.3, 0.0)}, "paddle_0 is out of the reach .*: 347.6"),
+        ("duel", {"paddle_1": (3.0, 0.0)}, "paddle_1 is off the table, by mm: 2209"),
+        ("duel", {"paddle_0": (-0.1, -0.06)}, None),
+        ("duel", {"puck_0": (0.83, 0.1)}, None),
+        ("move_block", {"block_0": (0.0, 1.0)}, "block_0 is off the table"),
+        ("free_for_all", {"paddle_2": (0.0, 0.0)}, "paddle_2 is out of the reach"),
+    ],
+)
+def test_a_body_is_on_the_table_in_its_reach_and_apart(name, bodies, words, backend):
+    options = {"pucks": 2} if name == "duel" else {}
+    world = ah.make_world(name, 1, backend=backend, options=options)
+    world.reset(0)
+    state, memory = world.get_state()
+    state.velocity[:] = 0.0
+    for body, place in bodies.items():
+        kind, k = body.split("_")
+        state.position[0, getattr(state.bodies, kind).start + int(k)] = place
+    if words is None:
+        world.set_state(state, memory)
+        return
+    before = world.state.position.copy()
+    with pytest.raises(ValueError, match=f"state: {words}"):
+        world.set_state(state, memory)
+    np.testing.assert_array_equal(world.state.position, before)
+
+
+def test_a_body_is_no_faster_than_any_can_be(backend):
+    world = ah.make_world("duel", 3, backend=backend)
+    world.reset(0)
+    state, memory = world.get_state()
+    state.puck_velocity[1, 0] = (500.0, 0.0)
+    match = r"puck_0 is faster than 50 m/s: 500 \(in world 1\)"
+    with pytest.raises(ValueError, match=match):
+        world.set_state(state, memory)
+
+
+def test_a_paddle_that_has_left_the_game_is_behind_its_side(backend):
+    world = ah.make_world("free_for_all", 1, backend=backend)
+    world.autoreset = False
+    world.reset(0)
+    state, memory = world.get_state()
+    memory["lives"][:, 2] = 0.0
+    world.set_state(state, memory)
+    world.step(np.zeros((1, 4, 2)))
+    kept = world.get_state()
+    assert world.state.paddle[0, 2, 0] > world.scene.table.offsets[2]
+    world.set_state(*kept)
+    alive = {**kept[1], "lives": np.full((1, 4), 3.0)}
+    with pytest.raises(ValueError, match="paddle_2 is off the table"):
+        world.set_state(kept[0], alive)
+
+
+@pytest.mark.parametrize("name", ["duel", "doubles", "strike_crowd", "move_block"])
+def test_any_state_of_an_episode_can_be_set(name, backend):
+    world = ah.make_world(name, 4, backend=backend)
+    world.reset(0)
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        world.step(rng.uniform(-1.0, 1.0, (4, len(world.open), 2)))
+        world.set_state(*world.get_state())

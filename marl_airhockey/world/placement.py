@@ -1,0 +1,108 @@
+"""Bounds of bodies that are placed from outside: on the table, apart, not too fast."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from marl_airhockey.core.limits import away
+from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.seat import ReachPlanes, reaches
+from marl_airhockey.core.state import Kind, State
+from marl_airhockey.types import Array
+
+DEEPEST = 0.01
+"""Depth to which bodies may overlap, as soft contacts of pymunk and robosuite let them (m)."""
+REACH_SLACK = 0.03
+"""Distance by which an arm may be beyond its reach (m)."""
+FASTEST = 50.0
+"""Speed that no body exceeds (m/s)."""
+
+
+def check_placement(state: State, scene: Scene, parked: Array) -> None:
+    """Refuse rows of a state in which a body is where, or as fast as, none can be.
+
+    Args:
+        state: rows (W,) of bodies.
+        scene: what is on the table.
+        parked: (W, seats) bool: True for paddles that have left the game, and the table.
+
+    Raises:
+        ValueError: The first such body, its world and the bound.
+    """
+    names = [
+        f"{kind.name.lower()}_{k}"
+        for kind in Kind
+        for k in range(state.bodies.kind.count(kind))
+    ]
+    gone = np.zeros((len(parked), len(names)), np.bool_)
+    gone[:, state.bodies.paddle] = parked
+    for i in range(state.bodies.movers):
+        speed = np.linalg.norm(state.velocity[:, i], axis=-1)
+        _refuse(speed > FASTEST, f"{names[i]} is faster than {FASTEST:g} m/s", speed, 1)
+        off = np.where(gone[:, i], 0.0, _depth(state, scene, i))
+        _refuse(off > DEEPEST, f"{names[i]} is off the table, by mm", off)
+    beyond = np.where(parked, 0.0, _beyond_reach(state, scene))
+    for i in range(state.bodies.paddles):
+        what = f"paddle_{i} is out of the reach of its seat, by mm"
+        _refuse(beyond[:, i] > REACH_SLACK, what, beyond[:, i])
+    # A puck that has ended a game stays on the goal line, and paddles pass it.
+    gone[:, state.bodies.puck] = _on_goal_line(state, scene)
+    for i, k in combinations(range(state.bodies.movers), 2):
+        between = np.linalg.norm(state.position[:, i] - state.position[:, k], axis=-1)
+        overlap = state.bodies.radius[i] + state.bodies.radius[k] - between
+        overlap[gone[:, i] | gone[:, k]] = 0.0
+        what = f"{names[i]} and {names[k]} overlap, by mm"
+        _refuse(overlap > DEEPEST, what, overlap)
+
+
+def _refuse(wrong: Array, what: str, values: Array, scale: float = 1e3) -> None:
+    if wrong.any():
+        world = int(np.flatnonzero(wrong)[0])
+        raise ValueError(
+            f"state: {what}: {scale * values[world]:.4g}"
+            + (f" (in world {world})" if len(wrong) > 1 else "")
+        )
+
+
+def _depth(state: State, scene: Scene, body: int) -> Array:
+    """(W,) depth of a body in a side or an obstacle, m; < 0 if it is clear of both.
+
+    The centre of a puck may be as far as a goal line.
+    """
+    table, position = scene.table, state.position[:, body]
+    radius = state.bodies.radius[body]
+    depth = radius - (position @ table.normals.T + table.offsets)
+    if state.bodies.kind[body] is Kind.PUCK:
+        depth[_before_goal(position, scene)] -= radius
+    for row in ReachPlanes.of(table, scene.seats).obstacles:
+        clear = [away(row, x, y)[2] for x, y in position]
+        gap = np.array(clear) + table.paddle_radius - radius
+        depth = np.column_stack([depth, -gap])
+    return np.asarray(depth.max(-1))
+
+
+def _before_goal(position: Array, scene: Scene) -> Array:
+    """(..., sides) bool: a point (..., 2) is between the ends of a side's goal line."""
+    sides = scene.table.normals.shape[0]
+    before = np.zeros((*position.shape[:-1], sides), np.bool_)
+    for line in scene.goal_lines:
+        start, end = scene.opening(line)
+        reach = np.linalg.norm(end - start) / 2
+        along = (position - (start + end) / 2) @ (end - start) / (2 * reach)
+        before[..., line.side] |= np.abs(along) < reach
+    return before
+
+
+def _on_goal_line(state: State, scene: Scene) -> Array:
+    """(W, pucks) bool: the centre of a puck is on a goal line, or beyond it."""
+    depth = -(state.puck @ scene.table.normals.T + scene.table.offsets)
+    return np.asarray((_before_goal(state.puck, scene) & (depth > -1e-6)).any(-1))
+
+
+def _beyond_reach(state: State, scene: Scene) -> Array:
+    """(W, seats) distance of each paddle beyond its seat's reach, m."""
+    normals, offsets = reaches(scene.table, scene.seats)
+    inside = np.einsum("skd,wsd->wsk", normals, state.paddle) + offsets
+    return np.asarray(-inside.min(-1))
