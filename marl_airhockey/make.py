@@ -18,6 +18,7 @@ from marl_airhockey.registry import make_scenario, scenario_names
 from marl_airhockey.world.world import World
 
 if TYPE_CHECKING:
+    from gymnasium.vector import AutoresetMode
     from pettingzoo.utils.env import AECEnv
 
     from marl_airhockey.envs.gymnasium_env import AirHockeySingleEnv
@@ -78,14 +79,27 @@ def gym_env(
 
 
 def make_vec(
-    scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
+    scenario: str | Scenario,
+    num_worlds: int = 1,
+    autoreset_mode: str | AutoresetMode = "NextStep",
+    render_mode: str | None = None,
+    **keywords: Unpack[Keywords],
 ) -> AirHockeyVectorEnv:
-    """Build a gymnasium VectorEnv of a scenario with one open seat."""
+    """Build a gymnasium VectorEnv of a scenario with one open seat.
+
+    Args:
+        scenario: Name of the scenario, or a scenario object.
+        num_worlds: Number of worlds, B.
+        autoreset_mode: "NextStep", "SameStep" or "Disabled", see `AirHockeyVectorEnv`.
+        render_mode: None or "rgb_array": a picture of each world.
+        **keywords: See `build.build_world`.
+    """
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
 
     if "num_envs" in keywords:
         raise UnknownKeywordError(unknown_keyword("num_envs", ["num_worlds"]))
-    return AirHockeyVectorEnv(scenario, num_worlds, **keywords)
+    modes = autoreset_mode, render_mode
+    return AirHockeyVectorEnv(scenario, num_worlds, *modes, **keywords)
 
 
 def make_sb3_vec(

@@ -28,8 +28,9 @@ def check_one_open(world: World) -> None:
     check_some_open(world)
     if len(world.open) > 1:
         agents = [f"paddle_{i}" for i in world.open]
+        others = ", ".join(f'"{agent}": "still"' for agent in agents[1:])
         raise ValueError(
             f"{world.scenario.name!r} has open seats {agents}; a single-agent "
             "environment needs exactly one: give the others drivers, e.g. "
-            'drivers={"paddle_1": "still"}'
+            f"drivers={{{others}}}"
         )

@@ -71,6 +71,8 @@ def _candidates() -> Iterator[Path]:
     with suppress(RuntimeError):
         home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         yield Path(home) / "marl_airhockey"
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        yield Path(given) / "marl_airhockey"
 
 
 @cache
@@ -78,9 +80,9 @@ def cache_folder() -> Path:
     """Return the folder of all that the library caches.
 
     That is MARL_AIRHOCKEY_CACHE, or else ``marl_airhockey`` in the user's cache
-    folder. A read-only one is used if it holds the compiled code of these sources, as
-    in a container. If there is none, a temporary folder serves this process and those
-    that it starts, with a warning.
+    folder, or in NUMBA_CACHE_DIR if neither can be written. A read-only one is used if
+    it holds the compiled code of these sources, as in a container. If there is none, a
+    temporary folder serves this process and those that it starts, with a warning.
     """
     tried = []
     for folder in _candidates():

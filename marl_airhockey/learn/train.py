@@ -153,6 +153,7 @@ def _continuation(
         return lambda: _go_on(learn, TrainingRun(config, folder, report))
     if isinstance(config, HindsightConfig):
         require("stable_baselines3", "train")
+        require("tensorboard", "train")
         from marl_airhockey.learn.hindsight.sac import train_with_hindsight
 
         return lambda: _go_on(train_with_hindsight, TrainingRun(config, folder, report))
@@ -186,6 +187,7 @@ Engine = Callable[[TrainingRun[PPOConfig]], Metrics]
 
 def _sb3() -> Engine:
     require("stable_baselines3", "train")
+    require("tensorboard", "train")
     from marl_airhockey.learn.sb3 import train_with_sb3
 
     return train_with_sb3

@@ -33,7 +33,7 @@ def most_served(scene: Scene) -> int:
 
 
 def _room(scene: Scene, x: float) -> float:
-    """Return the largest \\|y\\| of a puck's centre on the line at x, m; < 0 for none."""
+    """Return how far from the middle a puck may be on the line at x, m; < 0: none."""
     table = scene.table
     inside = table.normals[:, 0] * x + table.offsets - table.puck_radius - GAP
     slope = np.abs(table.normals[:, 1])
@@ -95,9 +95,9 @@ def serve(
 ) -> None:
     """Place a puck at its place in the middle, moving within 0.3 rad of a heading.
 
-    The state is changed in place, but for its paddles. Where a paddle or another puck is
-    in the way, the puck is placed at the nearest free point of its line, or of the next
-    one.
+    The state is changed in place, but for its paddles. Where a paddle or another puck
+    is in the way, the puck is placed at the nearest free point of its line, or of the
+    next one.
 
     Args:
         rng: one stream per row.
@@ -120,12 +120,12 @@ def serve(
 
 
 def serve_all(
-    rng: RandomStreams, scene: Scene, state: State, heading: Array, turn: float = 0.0
+    rng: RandomStreams, scene: Scene, state: State, heading: Array, between: float = 0.0
 ) -> None:
-    """Serve all pucks, each ``turn`` rad (left) further than the one before it."""
+    """Serve all pucks, the heading of each ``between`` rad left of the one before."""
     state.puck[:] = _places(scene)[:, 0]
     for k in range(scene.pucks):
-        serve(rng, scene, state, k, heading + k * turn)
+        serve(rng, scene, state, k, heading + k * between)
 
 
 @compiled(error_model="numpy")
@@ -149,14 +149,20 @@ def _serve(
         for k in range(len(places)):
             gap = np.inf
             for i in range(len(radius)):
-                x, y = position[w, i, 0] - places[k, 0], position[w, i, 1] - places[k, 1]
+                x, y = (
+                    position[w, i, 0] - places[k, 0],
+                    position[w, i, 1] - places[k, 1],
+                )
                 if i != body:
                     gap = min(gap, np.sqrt(x * x + y * y) - radius[i] - radius[body])
             if gap > most:
                 chosen, most = k, gap
             if gap > GAP:
                 break
-        position[w, body, 0], position[w, body, 1] = places[chosen, 0], places[chosen, 1]
+        position[w, body, 0], position[w, body, 1] = (
+            places[chosen, 0],
+            places[chosen, 1],
+        )
         velocity[w, body, 0] = SPEED * np.cos(heading[w])
         velocity[w, body, 1] = SPEED * np.sin(heading[w])
         spin[w, body] = edge[w] * SPEED / radius[body]

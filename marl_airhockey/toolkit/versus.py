@@ -85,7 +85,7 @@ class Versus(Scenario):
         for i, (side, y) in enumerate(self.lineup):
             state.paddle[:, i] = (0.7 * self.table_geometry.offsets[0] * (side - 1), y)
         toward = np.where(rng.uniform(0.0, 1.0) < 0.5, np.pi, 0.0)
-        serves.serve_all(rng, self.scene, state, toward, turn=np.pi)
+        serves.serve_all(rng, self.scene, state, toward, between=np.pi)
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

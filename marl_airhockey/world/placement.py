@@ -13,7 +13,7 @@ from marl_airhockey.core.state import Kind, State
 from marl_airhockey.types import Array
 
 DEEPEST = 0.01
-"""Depth to which bodies may overlap, as soft contacts of pymunk and robosuite let them (m)."""
+"""Depth to which bodies may overlap; contacts of pymunk and robosuite are soft (m)."""
 REACH_SLACK = 0.03
 """Distance by which an arm may be beyond its reach (m)."""
 FASTEST = 50.0
@@ -26,7 +26,7 @@ def check_placement(state: State, scene: Scene, parked: Array) -> None:
     Args:
         state: rows (W,) of bodies.
         scene: what is on the table.
-        parked: (W, seats) bool: True for paddles that have left the game, and the table.
+        parked: (W, seats) bool: True for paddles that have left the game.
 
     Raises:
         ValueError: The first such body, its world and the bound.

@@ -35,9 +35,9 @@ from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.elements import DragRegions, check_elements, clear_start
 from marl_airhockey.world.episode import Episode, PhysicsRows
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
+from marl_airhockey.world.placement import check_placement
 from marl_airhockey.world.referee import Referee
 from marl_airhockey.world.sensed_memory import SensedMemory
-from marl_airhockey.world.placement import check_placement
 from marl_airhockey.world.set_state import checked_memory, settled
 from marl_airhockey.world.step_result import StepResult
 

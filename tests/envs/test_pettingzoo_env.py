@@ -26,6 +26,9 @@ def test_a_driven_seat_makes_it_a_single_agent_environment():
     assert seen.shape == (4, len(env.observation_labels("paddle_1")))
     with pytest.raises(ValueError, match="needs exactly one"):
         ah.make_vec(Pair(), 4)
+    hint = r'drivers={"paddle_1": "still", "paddle_2": "still", "paddle_3": "still"}'
+    with pytest.raises(ValueError, match=hint):
+        ah.gym_env("doubles")
 
 
 def test_every_number_of_state_and_observation_has_a_name():

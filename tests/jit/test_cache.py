@@ -81,6 +81,16 @@ def test_a_folder_that_cannot_be_written_is_replaced_with_one_warning(tmp_path):
     assert not list(temporary.iterdir()), "it is deleted at the end"
 
 
+def test_the_folder_of_numba_serves_where_the_home_cannot_be_written(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    given = {"HOME": str(file / "home"), "XDG_CACHE_HOME": ""}
+    given["NUMBA_CACHE_DIR"] = str(tmp_path / "numba")
+    out, err = run(LOOP, "", **given)
+    assert err.count("compiling a loop once") == 1
+    assert run(LOOP, "", **given) == (out, ""), "nothing is compiled again"
+
+
 def test_a_cache_that_is_deleted_meanwhile_is_made_again(tmp_path):
     cache = tmp_path / "cache"
     program = LOOP + (

@@ -37,7 +37,9 @@ def test_every_number_of_pucks_starts_on_the_table(game, table):
         made = ah.make_scenario(game, table=table, pucks=pucks)
         state, _ = made.reset(streams(4), 4)
         assert room(made.scene, state).min() >= GAP - 1e-9, pucks
-    with pytest.raises(ValueError, match=f"pucks: {most + 1} do not fit.*room for {most}"):
+    with pytest.raises(
+        ValueError, match=f"pucks: {most + 1} do not fit.*room for {most}"
+    ):
         ah.make_scenario(game, table=table, pucks=most + 1)
 
 

@@ -103,6 +103,30 @@ def test_copies_of_arms_go_on_to_the_same_bit(steps, tmp_path):
         check_another_process(first, tmp_path)
 
 
+@pytest.mark.usefixtures("uncompiled")
+@pytest.mark.parametrize("game", ["duel", "move_block"])
+def test_copies_in_contact_go_on_to_the_same_bit(game, tmp_path):
+    world = ah.make_world(game, 2)
+    world.reset(3)
+    state, memory = world.get_state()
+    table = world.scene.table
+    state.velocity[:] = 0.0
+    state.paddle[:, 0] = (-0.4, 0.0)
+    # The puck moves into the paddle, which pushes it.
+    gap = table.paddle_radius + table.puck_radius - 1e-4
+    state.puck[:, 0], state.puck_velocity[:, 0] = (-0.4 + gap, 0.0), (-0.5, 0.1)
+    world.set_state(state, memory)
+    assert world.state.touching.any()
+    push = np.zeros((3, 2, len(world.open), 2))
+    push[..., 0, 0] = 1.0
+    play(world, push)
+    given = actions(world, 30, 2)
+    twins = [copy.deepcopy(world), pickle.loads(pickle.dumps(world))]
+    first = play(world, given)
+    for twin in twins:
+        np.testing.assert_equal(play(twin, given), first)
+
+
 def test_a_copy_before_the_first_reset_is_a_twin_too():
     world = ah.make_world("duel", 2)
     twin = pickle.loads(pickle.dumps(world))
