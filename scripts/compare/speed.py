@@ -2,8 +2,9 @@
 
     python scripts/compare/speed.py CHECKOUT
 
-measures the dict environment and 4096 worlds in steps per CPU-second of a process for
-each tree, with the compiled 2D backend, called batched in commit ec48060. The ratio is
+measures the dict environment, 4096 worlds, and 256 worlds in which every seat chases
+the puck, in steps per CPU-second of a process for each tree, with the compiled 2D
+backend, called batched in commit ec48060. The ratio is
 the median over the rounds, each of which measures both trees one after the other.
 """
 
@@ -21,7 +22,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-CASES = ("juggle dict", "duel dict", "juggle 4096", "duel 4096")
+CASES = (
+    *("juggle dict", "duel dict", "juggle 4096", "duel 4096"),
+    *("duel chase", "doubles chase", "free_for_all chase"),
+)
 MEASURE = """
 import sys, time
 import numpy as np
@@ -39,6 +43,17 @@ if kind == "dict":
             if not env.agents:
                 env.reset()
         return 512
+elif kind == "chase":
+    world = ah.make_world(scenario, 256, backend=backend)
+    table = world.scene.table
+    turns = np.array([table.rotation(seat.side) for seat in world.scene.seats])
+    world.reset(0)
+    def play():
+        for _ in range(4):
+            gap = world.state.puck[:, :1] - world.state.paddle
+            chase = 20.0 * np.einsum("skd,wsd->wsk", turns, gap)
+            world.step(np.clip(chase, -1.0, 1.0))
+        return 4 * 256
 else:
     world = ah.make_world(scenario, int(kind), backend=backend)
     shape = (8, int(kind), len(world.open), 2)
@@ -81,13 +96,14 @@ def ask(child: subprocess.Popen[str], seconds: float) -> float:
 
 def main(
     checkout: Path,
+    cases: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(CASES),
     rounds: Annotated[int, typer.Option(help="Rounds.")] = 9,
     seconds: Annotated[float, typer.Option(help="CPU-seconds of a case.")] = 2.0,
 ) -> None:
     """Measure both trees and print their rates and ratios."""
     table = Table("steps per CPU-s", "here", "there", "here / there", "spread")
     trees = Path(__file__).resolve().parents[2], checkout.resolve()
-    for case in CASES:
+    for case in cases.split(","):
         with ExitStack() as stack:
             children = [start(stack, tree, case) for tree in trees]
             rates = np.array(

@@ -31,18 +31,25 @@ from marl_airhockey.backends.numba.bodies import (
     AWAY,
     BLOCK,
     BODY,
+    CONTACT,
     EDGE,
+    FRICTION,
     GX,
     GY,
     HELD,
     INSIDE,
+    KICK,
     MASS,
+    NX,
+    NY,
     PINNED,
     PRESCRIBED,
     PUCK,
     RADIUS,
     REACH,
+    RESTITUTION,
     SPIN,
+    TINY,
     VX,
     VY,
     X,
@@ -60,16 +67,7 @@ from marl_airhockey.backends.numba.geometry import (
     in_contact,
     stays_in_reach,
 )
-from marl_airhockey.backends.numba.impacts import (
-    CONTACT,
-    FRICTION,
-    KICK,
-    NX,
-    NY,
-    RESTITUTION,
-    TINY,
-    solve,
-)
+from marl_airhockey.backends.numba.impacts import solve
 from marl_airhockey.backends.numba.near import list_near, longest_drift
 from marl_airhockey.backends.numba.overlaps import keep_in_reach, take_apart
 from marl_airhockey.contracts.backend import PATIENCE
@@ -78,6 +76,9 @@ from marl_airhockey.core.scatter import at_paddle, at_wall, draw
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
+
+JAMMED = 3.0
+"""Factor of drifts in a jam: contacts hold, so that ways need not be as true."""
 
 
 @compiled(nogil=True, error_model="numpy")
@@ -281,7 +282,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
         world = m, role, coefficients[b], walls, obstacles, held, edges
         left, rounds, moment, count = control_dt, 0, 0, 0
         # Nothing to be taken apart before the first drift.
-        stale, solved, apart, bend = True, False, True, 0.0
+        stale, solved, apart, bend, jam = True, False, True, 0.0, False
         while True:
             rounds += 1
             if stale:
@@ -312,7 +313,8 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
                 stale = apart = True
                 continue
             if hits and not solved:
-                solve(m, role, hide_constant(VX), pairs, contacts, visits, kept, n)
+                some = pairs, contacts, visits, kept, n
+                jam = solve(m, role, hide_constant(VX), *some, jam)
                 keep_below_the_cap()
                 collisions[b] += 1
                 stale = solved = True
@@ -326,10 +328,10 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             until = left - control_dt * (moments - moment) / moments
             if path.shape[1] == 0:
                 until = left
-            h = min(max(bend, safe), left, until)
+            h = min(max(JAMMED * bend if jam else bend, safe), left, until)
             if rounds > 60:
                 h = min(max(h, control_dt / 50), left)
-            h, stale = drift(
+            h, stale, jam = drift(
                 *world,
                 goal_lines,
                 near,
@@ -343,6 +345,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
                 h,
                 safe,
                 rounds <= 60,
+                jam,
             )
             left = left - h if left - h > 1e-12 else 0.0
             cross(b)

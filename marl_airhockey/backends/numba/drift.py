@@ -23,13 +23,18 @@ from marl_airhockey.backends.numba.bodies import (
     DY,
     EX,
     EY,
+    FRICTION,
     GX,
     GY,
     MASS,
+    NX,
+    NY,
     PINNED,
     PUCK,
     RADIUS,
+    RESTITUTION,
     SPIN,
+    TINY,
     VX,
     VY,
     X,
@@ -43,14 +48,7 @@ from marl_airhockey.backends.numba.geometry import (
     distance_to_fixed,
     in_contact,
 )
-from marl_airhockey.backends.numba.impacts import (
-    FRICTION,
-    NX,
-    NY,
-    RESTITUTION,
-    TINY,
-    solve,
-)
+from marl_airhockey.backends.numba.impacts import solve
 from marl_airhockey.backends.numba.near import BOW, list_near_drift
 from marl_airhockey.core.laws import fly, slide
 from marl_airhockey.jit.cache import compiled
@@ -58,6 +56,8 @@ from marl_airhockey.types import Array
 
 REFINEMENTS = 5
 """Number of times that the first touch is looked for, each on another chord."""
+WIDE = 1.7
+"""Factor of the drifts of discs that slide in a jam: they part by 0.9 mm."""
 LATER = 1.1
 """Share of a chord, a little beyond its end, up to which a touch is looked for."""
 
@@ -83,7 +83,8 @@ def drift(
     h: float,
     safe: float,
     sweeps: bool,
-) -> tuple[float, bool]:
+    jam: bool,
+) -> tuple[float, bool, bool]:
     """Move all bodies by at most h s, until something begins to touch.
 
     What is in contact does not close: that is solved for the mean velocities.
@@ -108,11 +109,16 @@ def drift(
         h: s.
         safe: s in which nothing begins to touch.
         sweeps: whether to end at the first touch.
+        jam: see `solve`.
 
     Returns:
-        The length of the drift, s, and True if ``near`` must be listed again.
+        The length of the drift, s, True if ``near`` must be listed again, and whether
+        paddles have given way.
     """
-    stale, most = False, h
+    stale, most, last, tried = False, h, 0.0, h
+    if jam:
+        slide = WIDE * _longest_slide(m, hide_constant(VX), pairs, contacts, n)
+        h = most = min(h, slide)
     for attempt in range(REFINEMENTS):
         _move_freely(m, role, row, left, h)
         hits = False
@@ -123,28 +129,35 @@ def drift(
         if hits:
             for c in range(n):
                 contacts[c, RESTITUTION] = contacts[c, FRICTION] = 0.0
-            solve(m, role, hide_constant(DX), pairs, contacts, visits, kept, n)
+            work = pairs, contacts, visits, kept, n
+            jam = solve(m, role, hide_constant(DX), *work, jam)
             stale, safe = True, 0.0
-            longest = _longest_slide(m, pairs, contacts, n)
+            longest = _longest_slide(m, hide_constant(DX), pairs, contacts, n)
+            longest *= 2.0 * WIDE if jam else 1.0
             if longest < h and attempt < REFINEMENTS - 1:
                 h = most = longest
                 continue
-            most, count = (
-                h,
-                list_near_drift(m, role, walls, obstacles, held, edges, h, near),
-            )
+            most = most if jam else h
+            fixed = walls, obstacles, held, edges
+            count = list_near_drift(m, role, *fixed, most, near)
         if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
             break
         # The chord to a touch is not the first one, so the touch may come later, too: a
         # little, as the search does not converge for slow bodies, and not beyond what
         # the pairs were listed for.
-        furthest = min(most / h, LATER)
+        furthest = most / h if jam else min(most / h, LATER)
         chord = m, role, walls, obstacles, goal_lines, near, count, h
         share = _first_touch(*chord, furthest)
         # At the cap on speed, a body moves less than half of `TOUCH` in this time.
         if share == furthest or abs(share - 1.0) * h < 4e-8:
             break
-        h = max(h * share, 1e-9)
+        error = np.log(max(share, 1e-9))
+        if jam and error > 0.0 > last:
+            # Bodies that are pressed start from rest, so that their ways grow faster
+            # than the time: by the secant of both errors.
+            share = max(np.exp(error * np.log(h / tried) / (last - error)), 0.1)
+        last, tried = error, h
+        h = min(max(h * share, 1e-9), most)
     for i in range(len(m)):
         if role[i] == PINNED:
             continue
@@ -155,21 +168,21 @@ def drift(
         m[i, VX] = m[i, EX] + 2.0 * (m[i, DX] - m[i, CX])
         m[i, VY] = m[i, EY] + 2.0 * (m[i, DY] - m[i, CY])
         m[i, ANGLE] += m[i, SPIN] * h
-    return h, stale
+    return h, stale, jam
 
 
 @compiled(nogil=True, error_model="numpy")
-def _longest_slide(m: Array, pairs: Array, contacts: Array, n: int) -> float:
+def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> float:
     """Return the longest drift in which discs that slide on each other part by `BOW`.
 
-    They part as a tangent does from its circle.
+    They part as a tangent does from its circle; ``at`` is the column of velocities.
     """
     longest = np.inf
     for c in range(n):
         i, j = pairs[c, 0], pairs[c, 1]
         if i >= 0:
             tx, ty = -contacts[c, NY], contacts[c, NX]
-            speed = abs(closing(m, DX, i, j, tx, ty))
+            speed = abs(closing(m, at, i, j, tx, ty))
             room = np.sqrt(2.0 * BOW * (m[i, RADIUS] + m[j, RADIUS]))
             longest = min(longest, room / max(speed, 1e-9))
     return float(longest)

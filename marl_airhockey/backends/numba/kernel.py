@@ -16,10 +16,9 @@ from marl_airhockey.backends.numba.arrays import (
     Result,
     Static,
 )
-from marl_airhockey.backends.numba.bodies import BODY
+from marl_airhockey.backends.numba.bodies import BODY, CONTACT
 from marl_airhockey.backends.numba.busy import advance_busy
 from marl_airhockey.backends.numba.flight import block_space, fly_freely
-from marl_airhockey.backends.numba.impacts import CONTACT
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
