@@ -1,4 +1,4 @@
-"""Serves: pucks that are placed around the middle of the table, moving slowly."""
+"""Serves: pucks that are put around the middle of the table, moving slowly."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PITCH = 0.12
 LINES = (0.0, PITCH, -PITCH, 2 * PITCH, -2 * PITCH)
 """x of the lines on which pucks are served, in the order in which they fill (m)."""
 STEP = 0.02
-"""Distance between two places on a line that are tried (m)."""
+"""Distance between two positions on a line that are tried (m)."""
 GAP = 0.005
 """Least distance between a served puck and anything else (m)."""
 SPEED = 0.5
@@ -28,7 +28,7 @@ SPEED = 0.5
 
 
 def most_served(scene: Scene) -> int:
-    """Return how many pucks a table has room for when all are served at once."""
+    """Return how many pucks a table has room for when all are served together."""
     return sum(_on_line(scene, x) for x in LINES)
 
 
@@ -49,11 +49,11 @@ def _on_line(scene: Scene, x: float) -> int:
 
 
 @cache
-def _places(scene: Scene) -> Array:
-    """Return the places that are tried for each puck, the best first (pucks, K, 2), m.
+def _positions(scene: Scene) -> Array:
+    """Return the positions that are tried for each puck, best first (pucks, K, 2), m.
 
     Pucks are side by side on the middle line, and on the next ones when it is full. A
-    puck's own place is first; others on its line follow, then those on other lines.
+    puck's own position is first; others on its line follow, then those on other lines.
 
     Raises:
         ValueError: more pucks than fit.
@@ -70,19 +70,19 @@ def _places(scene: Scene) -> Array:
     tried = []
     for x, y in own:
         found = [
-            (abs(line - x), abs(place - y), -place, line)
+            (abs(line - x), abs(aside - y), -aside, line)
             for line in LINES
             if (room := _room(scene, line)) >= 0.0
-            for place in y + STEP * np.arange(-100, 101)
-            if abs(place) <= room
-            and all(away(row, line, place)[2] >= 0.0 for row in obstacles)
+            for aside in y + STEP * np.arange(-100, 101)
+            if abs(aside) <= room
+            and all(away(row, line, aside)[2] >= 0.0 for row in obstacles)
         ]
         tried.append([(line, -minus) for _, _, minus, line in sorted(found)])
     most = max(map(len, tried))
     if not min(map(len, tried)):
         raise ValueError("obstacles: they leave no room for a serve")
-    # A last place that is repeated changes nothing.
-    return np.array([places + places[-1:] * (most - len(places)) for places in tried])
+    # A last position that is repeated changes nothing.
+    return np.array([row + row[-1:] * (most - len(row)) for row in tried])
 
 
 def serve(
@@ -93,10 +93,10 @@ def serve(
     heading: Array,
     rows: Array | None = None,
 ) -> None:
-    """Place a puck at its place in the middle, moving within 0.3 rad of a heading.
+    """Put a puck in the middle, moving within 0.3 rad of a heading.
 
     The state is changed in place, but for its paddles. Where a paddle or another puck
-    is in the way, the puck is placed at the nearest free point of its line, or of the
+    is there, the puck is put at the nearest free point of its line, or of the
     next one.
 
     Args:
@@ -114,7 +114,7 @@ def serve(
     some = np.ones(len(draws), np.bool_) if rows is None else rows
     _serve(
         *(state.position, state.velocity, state.spin, state.touching),
-        *(bodies.puck.start, puck, np.array(bodies.radius), _places(scene)[puck]),
+        *(bodies.puck.start, puck, np.array(bodies.radius), _positions(scene)[puck]),
         *(np.flatnonzero(some), heading + 0.3 * draws[:, 0], SPIN * draws[:, 1]),
     )
 
@@ -123,7 +123,7 @@ def serve_all(
     rng: RandomStreams, scene: Scene, state: State, heading: Array, between: float = 0.0
 ) -> None:
     """Serve all pucks, the heading of each ``between`` rad left of the one before."""
-    state.puck[:] = _places(scene)[:, 0]
+    state.puck[:] = _positions(scene)[:, 0]
     for k in range(scene.pucks):
         serve(rng, scene, state, k, heading + k * between)
 
@@ -137,7 +137,7 @@ def _serve(
     first: int,
     puck: int,
     radius: Array,
-    places: Array,
+    tried: Array,
     worlds: Array,
     heading: Array,
     edge: Array,
@@ -146,23 +146,19 @@ def _serve(
     body = first + puck
     for w in worlds:
         chosen, most = 0, -np.inf
-        for k in range(len(places)):
+        for k in range(len(tried)):
             gap = np.inf
             for i in range(len(radius)):
-                x, y = (
-                    position[w, i, 0] - places[k, 0],
-                    position[w, i, 1] - places[k, 1],
-                )
+                x = position[w, i, 0] - tried[k, 0]
+                y = position[w, i, 1] - tried[k, 1]
                 if i != body:
                     gap = min(gap, np.sqrt(x * x + y * y) - radius[i] - radius[body])
             if gap > most:
                 chosen, most = k, gap
             if gap > GAP:
                 break
-        position[w, body, 0], position[w, body, 1] = (
-            places[chosen, 0],
-            places[chosen, 1],
-        )
+        position[w, body, 0] = tried[chosen, 0]
+        position[w, body, 1] = tried[chosen, 1]
         velocity[w, body, 0] = SPEED * np.cos(heading[w])
         velocity[w, body, 1] = SPEED * np.sin(heading[w])
         spin[w, body] = edge[w] * SPEED / radius[body]

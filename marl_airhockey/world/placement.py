@@ -40,30 +40,29 @@ def check_placement(state: State, scene: Scene, parked: Array) -> None:
     gone[:, state.bodies.paddle] = parked
     for i in range(state.bodies.movers):
         speed = np.linalg.norm(state.velocity[:, i], axis=-1)
-        _refuse(speed > FASTEST, f"{names[i]} is faster than {FASTEST:g} m/s", speed, 1)
+        _refuse(f"{names[i]} moves at {{}} m/s", speed, FASTEST, 1.0)
         off = np.where(gone[:, i], 0.0, _depth(state, scene, i))
-        _refuse(off > DEEPEST, f"{names[i]} is off the table, by mm", off)
+        _refuse(f"{names[i]} is off the table by {{}} mm", off, DEEPEST)
     beyond = np.where(parked, 0.0, _beyond_reach(state, scene))
     for i in range(state.bodies.paddles):
-        what = f"paddle_{i} is out of the reach of its seat, by mm"
-        _refuse(beyond[:, i] > REACH_SLACK, what, beyond[:, i])
+        what = f"paddle_{i} is out of the reach of its seat by {{}} mm"
+        _refuse(what, beyond[:, i], REACH_SLACK)
     # A puck that has ended a game stays on the goal line, and paddles pass it.
     gone[:, state.bodies.puck] = _on_goal_line(state, scene)
     for i, k in combinations(range(state.bodies.movers), 2):
         between = np.linalg.norm(state.position[:, i] - state.position[:, k], axis=-1)
         overlap = state.bodies.radius[i] + state.bodies.radius[k] - between
         overlap[gone[:, i] | gone[:, k]] = 0.0
-        what = f"{names[i]} and {names[k]} overlap, by mm"
-        _refuse(overlap > DEEPEST, what, overlap)
+        _refuse(f"{names[i]} and {names[k]} overlap by {{}} mm", overlap, DEEPEST)
 
 
-def _refuse(wrong: Array, what: str, values: Array, scale: float = 1e3) -> None:
-    if wrong.any():
-        world = int(np.flatnonzero(wrong)[0])
-        raise ValueError(
-            f"state: {what}: {scale * values[world]:.4g}"
-            + (f" (in world {world})" if len(wrong) > 1 else "")
-        )
+def _refuse(what: str, values: Array, most: float, scale: float = 1e3) -> None:
+    """Refuse the first world whose value is above a bound; ``scale`` is of the text."""
+    worlds = np.flatnonzero(values > most)
+    if len(worlds):
+        found = what.format(f"{scale * values[worlds[0]]:.4g}")
+        where = f" in world {worlds[0]}" if len(values) > 1 else ""
+        raise ValueError(f"state: {found}{where}; at most {scale * most:g} is possible")
 
 
 def _depth(state: State, scene: Scene, body: int) -> Array:

@@ -17,7 +17,7 @@ from marl_airhockey.backends.numba.bodies import (
     VY,
 )
 from marl_airhockey.backends.numba.complementarity import complement
-from marl_airhockey.backends.numba.pushes import FREE, PADDLES, YIELDING, push
+from marl_airhockey.backends.numba.pushes import ALL, PADDLES, push
 
 
 def solved(matrix, right):
@@ -73,17 +73,15 @@ def test_paddles_that_meet_share_their_velocity():
     np.testing.assert_allclose(m[:, VX], -1.0)
 
 
-def test_a_free_puck_goes_with_the_paddle_and_the_paddle_notices_nothing():
-    m, role, pairs, contacts = row_of([ASKS, PUCK, PUCK], [2.0, 0.0, 5.0])
-    assert push(m, role, VX, pairs, contacts, 2, FREE)
+def test_what_parts_is_not_pushed():
+    m, role, pairs, contacts = row_of([PRESCRIBED, PUCK, PUCK], [2.0, 0.0, 5.0])
+    assert push(m, role, VX, pairs, contacts, 2, ALL)
     np.testing.assert_allclose(m[:, VX], [2.0, 2.0, 5.0])
 
 
 def test_a_puck_without_room_stops_paddles_that_ask():
     m, role, pairs, contacts = row_of([ASKS, ASKS, PUCK], [2.0, -1.0, 0.0], 0, 2, 1)
-    assert not push(m, role, VX, pairs, contacts, 2, FREE)
-    np.testing.assert_allclose(m[:, VX], [2.0, -1.0, 0.0])
-    assert push(m, role, VX, pairs, contacts, 2, YIELDING)
+    assert push(m, role, VX, pairs, contacts, 2, ALL)
     # All three count alike.
     np.testing.assert_allclose(m[:, VX], 1.0 / 3.0)
 
@@ -91,7 +89,6 @@ def test_a_puck_without_room_stops_paddles_that_ask():
 def test_a_puck_between_prescribed_paddles_cannot_be_helped():
     roles = [PRESCRIBED, PRESCRIBED, PUCK]
     m, role, pairs, contacts = row_of(roles, [1.0, -1.0, 0.0], 0, 2, 1)
-    for who in (FREE, YIELDING):
-        assert not push(m, role, VX, pairs, contacts, 2, who)
-        np.testing.assert_allclose(m[:, VX], [1.0, -1.0, 0.0])
-        assert (m[:, VY] == 0.0).all()
+    assert not push(m, role, VX, pairs, contacts, 2, ALL)
+    np.testing.assert_allclose(m[:, VX], [1.0, -1.0, 0.0])
+    assert (m[:, VY] == 0.0).all()

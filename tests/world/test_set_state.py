@@ -193,12 +193,20 @@ def test_environments_take_states_too():
 @pytest.mark.parametrize(
     ("name", "bodies", "words"),
     [
-        ("duel", {"puck_0": (2.0, 0.0)}, "puck_0 is off the table, by mm: 11.."),
-        ("duel", {"puck_0": (0.0, 0.3)}, "puck_0 is off the table, by mm: 26.9"),
-        ("duel", {"puck_0": (0.9, 0.0)}, "puck_0 is off the table, by mm: 61.8"),
-        ("duel", {"puck_1": (0.0, -0.06)}, "puck_0 and puck_1 overlap, by mm: 63.5"),
-        ("duel", {"paddle_0": (0.3, 0.0)}, "paddle_0 is out of the reach .*: 347.6"),
-        ("duel", {"paddle_1": (3.0, 0.0)}, "paddle_1 is off the table, by mm: 2209"),
+        (
+            "duel",
+            {"puck_0": (2.0, 0.0)},
+            "puck_0 .* 11.. mm; at most 10 is",
+        ),
+        ("duel", {"puck_0": (0.0, 0.3)}, "puck_0 is off the table by 26.9"),
+        ("duel", {"puck_0": (0.9, 0.0)}, "puck_0 is off the table by 61.8"),
+        ("duel", {"puck_1": (0.0, -0.06)}, "puck_0 and puck_1 overlap by 63.5"),
+        (
+            "duel",
+            {"paddle_0": (0.3, 0.0)},
+            "paddle_0 .* 347.6 mm; at most 30 is",
+        ),
+        ("duel", {"paddle_1": (3.0, 0.0)}, "paddle_1 is off the table by 2209"),
         ("duel", {"paddle_0": (-0.1, -0.06)}, None),
         ("duel", {"puck_0": (0.83, 0.1)}, None),
         ("move_block", {"block_0": (0.0, 1.0)}, "block_0 is off the table"),
@@ -228,7 +236,7 @@ def test_a_body_is_no_faster_than_any_can_be(backend):
     world.reset(0)
     state, memory = world.get_state()
     state.puck_velocity[1, 0] = (500.0, 0.0)
-    match = r"puck_0 is faster than 50 m/s: 500 \(in world 1\)"
+    match = "puck_0 moves at 500 m/s in world 1; at most 50 is"
     with pytest.raises(ValueError, match=match):
         world.set_state(state, memory)
 
@@ -256,4 +264,6 @@ def test_any_state_of_an_episode_can_be_set(name, backend):
     rng = np.random.default_rng(1)
     for _ in range(100):
         world.step(rng.uniform(-1.0, 1.0, (4, len(world.open), 2)))
-        world.set_state(*world.get_state())
+        state, memory = world.get_state()
+        world.set_state(state, memory)
+        np.testing.assert_array_equal(world.state.position, state.position)

@@ -29,9 +29,9 @@ pucks; blocks; what touches nothing; and a puck that has no room left."""
 
 NX, NY, RESTITUTION, FRICTION, KICK = range(5)
 CONTACT = 5
-"""Columns of a contact: unit normal from the first body to the second, the laws, and
-what scatter adds to the puck: speed along a wall (m/s), or at a paddle speed of the
-edge per speed of the puck."""
+"""Columns of a contact: unit normal from the first body to the second, restitution,
+friction, and what scatter adds to the puck: speed along a wall (m/s), or at a paddle
+speed of the edge per speed of the puck."""
 
 TINY = 1e-9
 """Closing speed that is none (m/s)."""

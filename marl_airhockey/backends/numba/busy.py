@@ -78,7 +78,7 @@ from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
 
 JAMMED = 3.0
-"""Factor of drifts in a jam: contacts hold, so that ways need not be as true."""
+"""Factor of drifts in a jam: contacts hold, so that paths need not be as true."""
 
 
 @compiled(nogil=True, error_model="numpy")

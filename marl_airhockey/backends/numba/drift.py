@@ -113,7 +113,7 @@ def drift(
 
     Returns:
         The length of the drift, s, True if ``near`` must be listed again, and whether
-        paddles have given way.
+        paddles have yielded to pucks.
     """
     stale, most, last, tried = False, h, 0.0, h
     if jam:
@@ -153,7 +153,7 @@ def drift(
             break
         error = np.log(max(share, 1e-9))
         if jam and error > 0.0 > last:
-            # Bodies that are pressed start from rest, so that their ways grow faster
+            # Bodies that are pressed start from rest, so that their paths grow faster
             # than the time: by the secant of both errors.
             share = max(np.exp(error * np.log(h / tried) / (last - error)), 0.1)
         last, tried = error, h

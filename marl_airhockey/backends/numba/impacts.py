@@ -2,8 +2,8 @@
 
 Contacts are solved as impacts of two bodies, one after the other and the hardest first.
 Each conserves momentum and takes energy, so all of them do. Where that does not end
-soon, `pushes` finds what is left at once; where it leaves a puck no room, or makes it
-faster than any blow could, a paddle that asks for a velocity gives way. The
+soon, or makes a puck faster than any blow could, `pushes` solves all contacts together,
+and a paddle that asks for a velocity yields to a puck that has no room. The
 hardest-first order makes the result independent of the order of the bodies.
 """
 
@@ -15,10 +15,8 @@ from marl_airhockey.backends.numba.bodies import (
     ASKS,
     DX,
     DY,
-    FRICTION,
     HELD,
     INSIDE,
-    KICK,
     MASS,
     NX,
     NY,
@@ -34,17 +32,17 @@ from marl_airhockey.backends.numba.bodies import (
     hide_constant,
     shares,
 )
-from marl_airhockey.backends.numba.impulses import hardest, scatter, strike
-from marl_airhockey.backends.numba.pushes import FREE, PADDLES, YIELDING, push
+from marl_airhockey.backends.numba.impulses import hardest, impact, strike
+from marl_airhockey.backends.numba.pushes import ALL, PADDLES, push
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
 TIMES = 4
 """Number of times that a contact returns its restitution at one moment."""
 IMPACTS = 6
-"""Number of impacts per contact before all that closes is pushed at once."""
+"""Number of impacts per contact before all contacts are solved together."""
 DIRECT = 2
-"""Number of impacts per contact of paddles before they are pushed at once."""
+"""Number of impacts per contact of paddles before these are solved together."""
 FAST = 0.1
 """Closing speed from which on contacts in a jam bounce (m/s)."""
 STOPS = 20
@@ -76,19 +74,15 @@ def solve(
         visits: work space (n or more,).
         kept: work space (N, 3).
         n: number of contacts.
-        jam: whether paddles have given way in this step.
+        jam: whether paddles have yielded to pucks in this step.
 
     Returns:
-        True if paddles gave way for what has no room.
+        True if paddles have yielded.
     """
     i, j = pairs[0, 0], pairs[0, 1]
     if n == 1 and at == VX and i < 0 and role[j] == PUCK:
         # Most often a puck meets a wall, which one impact settles.
-        nx, ny = contacts[0, NX], contacts[0, NY]
-        contact = nx, ny, contacts[0, RESTITUTION], contacts[0, FRICTION]
-        strike(m, at, i, j, contact, shares(m, role, i, j, False))
-        if contacts[0, KICK] != 0.0:
-            scatter(m, at, i, j, nx, ny, contacts[0, KICK])
+        impact(m, role, at, pairs, contacts, 0, contacts[0, RESTITUTION], True)
         return jam
     top, paddle = 0.0, False
     for i in range(len(m)):
@@ -113,8 +107,6 @@ def solve(
             calm = _bounce(m, role, at, pairs, contacts, visits, n, most, TINY)
         else:
             calm = _rest(m, role, pairs, contacts, n)
-        if not calm and not paddle:
-            calm = push(m, role, at, pairs, contacts, n, hide_constant(FREE))
     slow = True
     for i in range(len(m) if paddle else 0):
         x, y = m[i, at], m[i, at + 1]
@@ -125,7 +117,7 @@ def solve(
         for i in range(len(m) if paddle and not (jam and slow) else 0):
             if role[i] > PRESCRIBED:
                 m[i, at], m[i, at + 1], m[i, SPIN] = kept[i, 0], kept[i, 1], kept[i, 2]
-        if not push(m, role, at, pairs, contacts, n, hide_constant(YIELDING)):
+        if not push(m, role, at, pairs, contacts, n, hide_constant(ALL)):
             _stop_paddles(m, role, at, pairs, contacts, visits, n)
     for i in range(len(m) if paddle else 0):
         if role[i] == ASKS and (m[i, at] != kept[i, 0] or m[i, at + 1] != kept[i, 1]):
@@ -155,11 +147,7 @@ def _bounce(
             return True
         restitution = contacts[c, RESTITUTION] if visits[c] < TIMES else 0.0
         visits[c] += 1
-        i, j = pairs[c, 0], pairs[c, 1]
-        contact = contacts[c, NX], contacts[c, NY], restitution, contacts[c, FRICTION]
-        strike(m, at, i, j, contact, shares(m, role, i, j, False))
-        if visits[c] == 1 and contacts[c, KICK] != 0.0:
-            scatter(m, at, i, j, contact[0], contact[1], contacts[c, KICK])
+        impact(m, role, at, pairs, contacts, c, restitution, visits[c] == 1)
     return False
 
 
@@ -185,14 +173,14 @@ def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
         i, j = pairs[found, 0], pairs[found, 1]
         nx, ny = contacts[found, NX], contacts[found, NY]
         mine = m[i, MASS] if i >= 0 else 0.0
-        push = -closing(m, DX, i, j, nx, ny) / (mine + m[j, MASS])
-        push = max(push, -pushed[found])
-        pushed[found] += push
-        m[j, DX] += push * m[j, MASS] * nx
-        m[j, DY] += push * m[j, MASS] * ny
+        size = -closing(m, DX, i, j, nx, ny) / (mine + m[j, MASS])
+        size = max(size, -pushed[found])
+        pushed[found] += size
+        m[j, DX] += size * m[j, MASS] * nx
+        m[j, DY] += size * m[j, MASS] * ny
         if i >= 0:
-            m[i, DX] -= push * mine * nx
-            m[i, DY] -= push * mine * ny
+            m[i, DX] -= size * mine * nx
+            m[i, DY] -= size * mine * ny
     return False
 
 

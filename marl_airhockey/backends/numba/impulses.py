@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.backends.numba.bodies import (
+    FRICTION,
+    KICK,
     NX,
     NY,
     PINNED,
@@ -12,6 +14,7 @@ from marl_airhockey.backends.numba.bodies import (
     RADIUS,
     SPIN,
     closing,
+    shares,
 )
 from marl_airhockey.core.laws import impulse
 from marl_airhockey.jit.cache import compiled
@@ -71,6 +74,25 @@ def scatter(
     else:
         speed = np.sqrt(m[j, at] ** 2 + m[j, at + 1] ** 2)
         m[j, SPIN] += kick * speed / m[j, RADIUS]
+
+
+@compiled(nogil=True, error_model="numpy", forceinline=True)
+def impact(
+    m: Array,
+    role: Array,
+    at: int,
+    pairs: Array,
+    contacts: Array,
+    c: int,
+    restitution: float,
+    first: bool,
+) -> None:
+    """Strike contact ``c`` once; it scatters if that is the first time."""
+    i, j, nx, ny = pairs[c, 0], pairs[c, 1], contacts[c, NX], contacts[c, NY]
+    contact = nx, ny, restitution, contacts[c, FRICTION]
+    strike(m, at, i, j, contact, shares(m, role, i, j, False))
+    if first and contacts[c, KICK] != 0.0:
+        scatter(m, at, i, j, nx, ny, contacts[c, KICK])
 
 
 @compiled(nogil=True, error_model="numpy")

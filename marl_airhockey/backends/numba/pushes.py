@@ -1,4 +1,4 @@
-"""Pushes: impulses without restitution at all contacts of a moment, found at once.
+"""Pushes: impulses without restitution at all contacts of a moment, solved together.
 
 They are the least that let nothing in contact close (Gauss' principle): a contact that
 pushes neither closes nor parts, one that does not push may part.
@@ -22,11 +22,9 @@ from marl_airhockey.backends.numba.complementarity import complement
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
-PADDLES, FREE, YIELDING = range(3)
-"""Which contacts are pushed: those of paddles with paddles and with the edges of their
-reaches; all others, where no paddle gives way; all, where those that ask do."""
-PUCKS = 1.0
-"""Mass of a paddle that gives way, in pucks: it does so for what has no room."""
+PADDLES, ALL = range(2)
+"""Contacts that are solved: those of paddles with paddles and with the edges of their
+reaches, or all. A paddle that asks counts as much as the lightest other body."""
 CLOSES = 1e-6
 """Closing speed at which what was found is no solution (m/s)."""
 
@@ -44,25 +42,25 @@ def push(
         pairs: bodies of each contact (n or more, 2).
         contacts: (n or more, CONTACT).
         n: number of contacts.
-        who: `PADDLES`, `FREE` or `YIELDING`.
+        who: `PADDLES` or `ALL`.
 
     Returns:
         True if there are such pushes; if not, nothing has changed.
     """
     weight, lightest = np.zeros(len(m)), 0.0
     for i in range(len(m)):
-        if role[i] > PRESCRIBED and role[i] < PINNED and who != PADDLES:
+        if PRESCRIBED < role[i] < PINNED and who == ALL:
             weight[i] = m[i, MASS]
             lightest = max(lightest, m[i, MASS])
     for i in range(len(m)):
-        if role[i] == ASKS and who != FREE:
-            weight[i] = lightest / PUCKS if who == YIELDING else 1.0
+        if role[i] == ASKS:
+            weight[i] = lightest if lightest > 0.0 else 1.0
     # Contacts, and what scales each to an effective mass of 1.
     which, scale, count = np.empty(n, np.int64), np.empty(n), 0
     for c in range(n):
         i, j = pairs[c, 0], pairs[c, 1]
         pinned = role[j] == PINNED or (i >= 0 and role[i] == PINNED)
-        if pinned or (who != YIELDING and (role[j] <= PRESCRIBED) != (who == PADDLES)):
+        if pinned or (who == PADDLES and role[j] > PRESCRIBED):
             continue
         mass = weight[j] + (weight[i] if i >= 0 else 0.0)
         if mass > 0.0:
