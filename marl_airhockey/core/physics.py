@@ -102,15 +102,17 @@ class Physics:
     def draw(self, rng: RandomStreams) -> dict[str, Array]:
         """Draw one value of every parameter for each of W worlds: name -> (W,)."""
         values: dict[str, Array] = {}
+        drawn = [n for n, (a, b) in self.ranges.items() if n in self._follows or a != b]
+        # All in one call, which for one world costs as much as a single one.
+        units = dict(zip(drawn, rng.uniform(0.0, 1.0, len(drawn)).T, strict=True))
         for name, (low, high) in self.ranges.items():
             if name in self._follows:
                 follow = self._follows[name]
-                unit = rng.uniform(0.0, 1.0)
-                values[name] = follow.at_value(values[follow.other], unit)
-            elif low == high:
-                values[name] = np.full(len(rng), low)
+                values[name] = follow.at_value(values[follow.other], units[name])
+            elif name in units:
+                values[name] = low + (high - low) * units[name]
             else:
-                values[name] = rng.uniform(low, high)
+                values[name] = np.full(len(rng), low)
         if self.highest("slope") > 0.0:
             for name in self._sloping:
                 values[name] += values["slope"] * rng.normal()

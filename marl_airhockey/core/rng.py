@@ -118,7 +118,7 @@ class RandomStreams:
         some.spread = self.spread
         return some
 
-    def _units(self, *shape: int) -> Array:
+    def units(self, *shape: int) -> Array:
         """Sample (W, *shape) numbers uniform in [0, 1)."""
         unit = np.empty((len(self._rows), math.prod(shape)))
         _unit(self._keys, self._counts, self._rows, unit)
@@ -126,7 +126,7 @@ class RandomStreams:
 
     def uniform(self, low: Array | float, high: Array | float, *shape: int) -> Array:
         """Draw (W, *shape) numbers uniform in [low, high), narrowed by `spread`."""
-        drawn = self._units(*shape)
+        drawn = self.units(*shape)
         if self.spread != 1.0:
             drawn = 0.5 + self.spread * (drawn - 0.5)
         drawn *= high - low
@@ -135,7 +135,7 @@ class RandomStreams:
 
     def normal(self, *shape: int) -> Array:
         """Draw (W, *shape) standard normal numbers (Box and Muller's transform)."""
-        pair = self._units(2, *shape)
+        pair = self.units(2, *shape)
         radius = np.sqrt(-2.0 * np.log1p(-pair[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pair[:, 1]))
 

@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.types import Array, Rows
+from marl_airhockey.jit.cache import compiled
+from marl_airhockey.types import Array
 
 WAVES = 4
 """Number of plane waves in a map, for each component."""
 LENGTHS = (0.7, 1.4)
 """Range of the wavelengths, in widths of the table; a map that was measured on a real
 table had a period of about one width."""
+
+
+class Waves(NamedTuple):
+    """Plane waves of the maps of B worlds, for both components."""
+
+    x: Array
+    """(B, WAVES, 2) wave numbers along x, rad/m"""
+    y: Array
+    """(B, WAVES, 2) wave numbers along y, rad/m"""
+    phase: Array
+    """(B, WAVES, 2) phases, rad"""
+    height: Array
+    """(B,) amplitudes, m"""
 
 
 class CalibrationMap:
@@ -26,10 +42,9 @@ class CalibrationMap:
 
     def __init__(self, worlds: int, width: float) -> None:
         self._width = width
-        shape = (worlds, WAVES, 2)
-        self._x, self._y = np.zeros(shape), np.zeros(shape)
-        """Wave numbers along x and y of the waves of both components, rad/m"""
-        self._phase, self._height = np.zeros(shape), np.zeros(worlds)
+        shape = (3, worlds, WAVES, 2)
+        x, y, phase = np.zeros(shape)
+        self.waves = Waves(x, y, phase, np.zeros(worlds))
 
     def sample(self, rng: RandomStreams, sd: Array, worlds: Array) -> None:
         """Sample new maps for some worlds, by index (W,).
@@ -39,22 +54,38 @@ class CalibrationMap:
             sd: Standard deviations (W,), m.
             worlds: Indices of the worlds.
         """
-        unit = rng.uniform(0.0, 1.0, 3, WAVES, 2)
+        unit, waves = rng.units(3, WAVES, 2), self.waves
         low, high = (2.0 * np.pi / (self._width * length) for length in LENGTHS[::-1])
         number = low + (high - low) * unit[:, 0]
-        heading, self._phase[worlds] = (
+        heading, waves.phase[worlds] = (
             2.0 * np.pi * unit[:, 1],
             2.0 * np.pi * unit[:, 2],
         )
-        self._x[worlds], self._y[worlds] = (
-            number * np.cos(heading),
-            number * np.sin(heading),
-        )
-        self._height[worlds] = sd * np.sqrt(2.0 / WAVES)
+        waves.x[worlds] = number * np.cos(heading)
+        waves.y[worlds] = number * np.sin(heading)
+        waves.height[worlds] = sd * np.sqrt(2.0 / WAVES)
 
-    def shifted(self, position: Array, rows: Rows) -> Array:
-        """Return positions (W, n, 2) in some worlds with the error added, m."""
-        x, y = position[:, :, None, None, 0], position[:, :, None, None, 1]
-        waves = self._x[rows][:, None] * x + self._y[rows][:, None] * y
-        shift = np.cos(waves + self._phase[rows][:, None]).sum(2)
-        return np.asarray(position + self._height[rows][:, None, None] * shift)
+    def shifted(self, position: Array, worlds: Array) -> Array:
+        """Return positions (W, n, 2) in some worlds, by index, with the error, m."""
+        out = np.empty(position.shape)
+        _shift(self.waves, worlds, position, out)
+        return out
+
+
+@compiled(nogil=True, error_model="numpy")
+def _shift(waves: Waves, worlds: Array, position: Array, out: Array) -> None:
+    for row in range(len(worlds)):
+        for k in range(position.shape[1]):
+            x, y = position[row, k]
+            out[row, k] = shift(waves, worlds[row], x, y)
+
+
+@compiled(nogil=True, error_model="numpy")
+def shift(waves: Waves, w: int, x: float, y: float) -> tuple[float, float]:
+    """Return a position in a world with the error added, m."""
+    dx = dy = 0.0
+    for k in range(WAVES):
+        phase = waves.phase[w, k]
+        dx += np.cos(waves.x[w, k, 0] * x + waves.y[w, k, 0] * y + phase[0])
+        dy += np.cos(waves.x[w, k, 1] * x + waves.y[w, k, 1] * y + phase[1])
+    return x + waves.height[w] * dx, y + waves.height[w] * dy

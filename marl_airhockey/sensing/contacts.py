@@ -11,7 +11,7 @@ import numpy as np
 
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.jit.cache import compiled
-from marl_airhockey.types import Array, Rows
+from marl_airhockey.types import Array
 
 MOMENTS = 9
 """Number of times between two frames at which the paths are checked"""
@@ -42,36 +42,42 @@ class ContactSensor:
         self.touching = np.zeros(pairs, np.bool_)
         """(B, paddles, pucks) True if in contact in the newest frame"""
 
-    def reset(self, worlds: Array, tracks: Array) -> None:
+    def reset(self, worlds: Array, taken: Array, track: Array) -> None:
         """Forget all contacts in some worlds, by index.
 
         Args:
             worlds: Indices (W,) of the worlds.
-            tracks: (W, pucks, 5) time, s, position, m, velocity, m/s, in a frame.
+            taken: (B, pucks and more) time of a frame, s.
+            track: (B, pucks and more, 4 and more) position, m, velocity, m/s, in it.
         """
-        self._tracks[worlds] = tracks
+        pucks = self._tracks.shape[1]
+        self._tracks[worlds, :, 0] = taken[worlds, :pucks]
+        self._tracks[worlds, :, 1:] = track[worlds, :pucks, :4]
         self.touched[worlds], self.touched_at[worlds] = 0, np.nan
         self.touching[worlds] = False
 
-    def update(self, tracks: Array, paddles: Array, now: Array, rows: Rows) -> None:
+    def update(
+        self, worlds: Array, taken: Array, track: Array, paddles: Array, now: Array
+    ) -> None:
         """Find the contacts before the newest frames.
 
         Args:
-            tracks: (W, pucks, 5) time, s, position, m, velocity, m/s, in the frames.
-            paddles: Paths (W, n, S, 2) of the paddles, a control step apart, the last
+            worlds: Indices (W,) of the worlds.
+            taken: (B, pucks and more) time of the frames, s.
+            track: (B, pucks and more, 4 and more) position, m, velocity, m/s, in them.
+            paddles: Paths (B, n, S, 2) of the paddles, a control step apart, the last
                 position that of now, m.
-            now: Times (W,) now, s.
-            rows: The W worlds.
+            now: Times (B,) now, s.
         """
-        worlds = np.arange(len(self._tracks))[rows]
         state = self._tracks, self.touched, self.touched_at, self.touching
-        _update(worlds, tracks, paddles, now, self._near, self._dt, *state)
+        _update(worlds, taken, track, paddles, now, self._near, self._dt, *state)
 
 
 @compiled(nogil=True, error_model="numpy")
 def _update(
     worlds: Array,
-    tracks: Array,
+    taken: Array,
+    track: Array,
     paddles: Array,
     now: Array,
     near: float,
@@ -82,20 +88,19 @@ def _update(
     touching: Array,
 ) -> None:
     """Update the arrays of a `ContactSensor` in place, see its `update`."""
-    kept = paddles.shape[1]
-    for row in range(len(worlds)):
-        w = worlds[row]
-        times = now[row] - control_dt * np.arange(kept - 1, -1, -1)
+    stored, new = paddles.shape[1], np.empty(5)
+    for w in worlds:
+        times = now[w] - control_dt * np.arange(stored - 1, -1, -1)
         touched[w], touched_at[w] = 0, np.nan
-        for p in range(tracks.shape[1]):
-            new = tracks[row, p]
-            if new[0] <= last[w, p, 0]:
+        for p in range(last.shape[1]):
+            if taken[w, p] <= last[w, p, 0]:
                 continue
+            new[0], new[1:] = taken[w, p], track[w, p, :4]
             for s in range(paddles.shape[2]):
-                at = contact_time(last[w, p], new, times, paddles[row, :, s], near)
+                at = contact_time(last[w, p], new, times, paddles[w, :, s], near)
                 if np.isfinite(at) and not touching[w, s, p]:
                     touched[w, s, p] = 1
-                    touched_at[w, s, p] = at - (now[row] - control_dt)
+                    touched_at[w, s, p] = at - (now[w] - control_dt)
                 touching[w, s, p] = np.isfinite(at)
             last[w, p] = new
 

@@ -98,9 +98,13 @@ class Estimator:
         """(B, pucks, 5) estimates for now: x, y, m, vx, vy, speed of the edge, m/s"""
 
     @property
-    def tracks(self) -> Array:
-        """(B, pucks, 5) time, s, x, y, m, vx, vy, m/s, at each puck's last frame."""
-        return np.concatenate([self._taken[..., None], self._mean[..., :4]], -1)
+    def tracks(self) -> tuple[Array, Array]:
+        """Estimates at the last frame of each puck.
+
+        Times (B, pucks), s; x, y, m, vx, vy, m/s, and speed of the edge, m/s, then,
+        (B, pucks, 5).
+        """
+        return self._taken, self._mean
 
     def reset(self, worlds: Array, seen: Array, velocity: Array, taken: Array) -> None:
         """Reset worlds (W,) to pucks with some velocity.
@@ -125,12 +129,12 @@ class Estimator:
 
         Args:
             worlds: Indices (W,) of the worlds.
-            seen: Positions (W, pucks, 2) in the frame, m.
+            seen: Positions (W, pucks and more, 2) in the frame, m.
             taken: Times (W,) of the frame, s.
-            fresh: (W, pucks) bool, True for pucks that are visible in a new frame.
-            paddles: Paths (W, n, S, 2) of the paddles, a control step apart, the last
+            fresh: (W, pucks and more) bool, True for what is visible in a new frame.
+            paddles: Paths (B, n, S, 2) of the paddles, a control step apart, the last
                 position that of now, m.
-            now: Times (W,) now, s.
+            now: Times (B,) now, s.
         """
         _update(
             *(worlds, seen, taken, fresh, paddles, now, self._known),
@@ -154,7 +158,7 @@ def _update(
     doubted: Array,
     shown: Array,
 ) -> None:
-    """Update the arrays of an `Estimator` in place, see `Estimator.update_along`."""
+    """Update the arrays of an `Estimator` in place, see `Estimator.update`."""
     ahead, wide = np.empty(5), np.empty(3)
     for row in range(len(worlds)):
         w = worlds[row]
@@ -162,15 +166,15 @@ def _update(
             if fresh[row, p]:
                 ahead[:], wide[:] = mean[w, p], spread[w, p]
                 since = taken[row] - last[w, p]
-                _predict(ahead, wide, last[w, p], since, paddles[row], now[row], known)
+                _predict(ahead, wide, last[w, p], since, paddles[w], now[w], known)
                 doubted[w, p] = _correct(
                     ahead, wide, seen[row, p], since, doubted[w, p], known.noise
                 )
                 if not doubted[w, p]:
                     mean[w, p], spread[w, p], last[w, p] = ahead, wide, taken[row]
             ahead[:], wide[:] = mean[w, p], spread[w, p]
-            since = now[row] - last[w, p]
-            _predict(ahead, wide, last[w, p], since, paddles[row], now[row], known)
+            since = now[w] - last[w, p]
+            _predict(ahead, wide, last[w, p], since, paddles[w], now[w], known)
             shown[w, p] = ahead
 
 

@@ -1,12 +1,17 @@
-"""Occlusion: pucks that an arm hides from the camera."""
+"""Occlusion: pucks that an arm hides from the camera.
+
+An arm reaches from the middle of its seat's side to the paddle. Near an arm, a puck
+changes between hidden and visible as a Markov chain of two states. Elsewhere it is
+always visible.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.types import Array, Rows
+from marl_airhockey.jit.cache import compiled
+from marl_airhockey.types import Array
 
 SECONDS = 0.1
 """Mean length of an occlusion near an arm (s). In measured play, half of them were
@@ -16,61 +21,44 @@ NEAR = 0.25
 were within it, or at the far rail."""
 
 
-class Occlusion:
-    """Occlusion of the pucks of B worlds.
+def bases(scene: Scene) -> Array:
+    """Return where the arms stand: (seats, 2) the middles of the seats' sides, m."""
+    ends = [scene.table.ends(seat.side) for seat in scene.seats]
+    return np.array([(start + end) / 2 for start, end in ends])
 
-    An arm reaches from the middle of its seat's side to the paddle. Near an arm, a puck
-    changes between hidden and visible as a Markov chain of two states. Elsewhere it is
-    always visible.
+
+@compiled(nogil=True, error_model="numpy")
+def near_arm(x: float, y: float, bases: Array, paddles: Array) -> bool:
+    """Return True for a puck near an arm.
 
     Args:
-        scene: Scene whose seats have the arms.
-        worlds: Number of worlds, B.
-        control_dt: Time between two steps, s.
+        x: Position of the puck along x, m.
+        y: Position of the puck along y, m.
+        bases: Positions (seats, 2) of the arms, m.
+        paddles: Positions (seats, 2), m.
     """
+    for s in range(len(bases)):
+        along_x, along_y = paddles[s] - bases[s]
+        gap_x, gap_y = x - bases[s, 0], y - bases[s, 1]
+        square = along_x * along_x + along_y * along_y
+        share = (gap_x * along_x + gap_y * along_y) / max(square, 1e-12)
+        share = min(max(share, 0.0), 1.0)
+        gap_x -= share * along_x
+        gap_y -= share * along_y
+        if gap_x * gap_x + gap_y * gap_y < NEAR * NEAR:
+            return True
+    return False
 
-    def __init__(self, scene: Scene, worlds: int, control_dt: float) -> None:
-        self._visible = np.ones((worlds, scene.pucks), np.bool_)
-        self._end = min(control_dt / SECONDS, 1.0)
-        ends = [scene.table.ends(seat.side) for seat in scene.seats]
-        self._bases = np.array([(start + end) / 2 for start, end in ends])
 
-    def reset(self, worlds: Array) -> None:
-        """Make all pucks visible in some worlds, by index."""
-        self._visible[worlds] = True
+@compiled(nogil=True, error_model="numpy")
+def stays_visible(visible: bool, share: float, dt: float, unit: float) -> bool:
+    """Sample whether a puck near an arm is visible now.
 
-    def near(self, pucks: Array, paddles: Array) -> Array:
-        """Return (W, pucks) bool, True for pucks near an arm.
-
-        Args:
-            pucks: Positions (W, pucks, 2), m.
-            paddles: Positions (W, seats, 2), m.
-        """
-        along = (paddles - self._bases)[:, None]
-        gap = pucks[:, :, None] - self._bases
-        share = (gap * along).sum(-1) / np.maximum((along * along).sum(-1), 1e-12)
-        gap -= np.clip(share, 0.0, 1.0)[..., None] * along
-        return np.asarray((gap * gap).sum(-1).min(-1) < NEAR * NEAR)
-
-    def sample_visible(
-        self,
-        pucks: Array,
-        paddles: Array,
-        share: Array,
-        rng: RandomStreams,
-        rows: Rows,
-    ) -> Array:
-        """Sample which pucks are visible in some worlds (W,), (W, pucks) bool.
-
-        Args:
-            pucks: Positions (W, pucks, 2), m.
-            paddles: Positions (W, seats, 2), m.
-            share: Share (W,) of the time near an arm in which a puck is hidden.
-            rng: Streams of these worlds.
-            rows: Worlds.
-        """
-        begin = (self._end * share / (1.0 - share))[:, None]
-        unit = rng.uniform(0.0, 1.0, pucks.shape[1])
-        visible = np.where(self._visible[rows], unit >= begin, unit < self._end)
-        self._visible[rows] = visible | ~self.near(pucks, paddles)
-        return np.asarray(self._visible[rows])
+    Args:
+        visible: Whether it was a step ago.
+        share: Share of the time near an arm in which a puck is hidden.
+        dt: Time of a step, s.
+        unit: Random number, uniform in [0, 1).
+    """
+    end = min(dt / SECONDS, 1.0)
+    return unit >= end * share / (1.0 - share) if visible else unit < end

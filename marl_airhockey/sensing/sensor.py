@@ -155,10 +155,12 @@ class Sensor:
         """Return the newest row (B, pucks, 4) of the history."""
         if self._sight is not None:
             return self._sight()
-        seen = np.stack([sensed.visible, self.age], -1)
-        return np.concatenate([sensed.puck, seen], -1)
+        newest = np.empty((*self.age.shape, 4))
+        newest[..., :2], newest[..., 2] = sensed.puck, sensed.visible
+        newest[..., 3] = self.age
+        return newest
 
     @staticmethod
     def _append(past: Array, newest: Array, rows: Rows) -> None:
         """Append a row (B, ...) to a past (B, n, ...) in some worlds, in place."""
-        past[rows] = np.concatenate([past[rows][:, 1:], newest[rows][:, None]], 1)
+        past[rows, :-1], past[rows, -1] = past[rows, 1:], newest[rows]

@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.rng import RandomStreams, StreamSet
+from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
+from marl_airhockey.sensing import frame
 from marl_airhockey.sensing.calibration import CalibrationMap
 from marl_airhockey.sensing.contacts import ContactSensor
-from marl_airhockey.sensing.delay import TrajectoryDelay
+from marl_airhockey.sensing.delay import depth
 from marl_airhockey.sensing.estimator import Estimator
-from marl_airhockey.sensing.occlusion import Occlusion
+from marl_airhockey.sensing.occlusion import bases
 from marl_airhockey.types import ALL, Array, Rows
 
 SENSED = (
@@ -25,8 +26,6 @@ SENSED = (
 """Names of the physical parameters of sensing."""
 PAST = 0.4
 """Time for which the paths of paddles are stored, s"""
-SAME_FRAME = 1e-4
-"""Largest time between two readings of the same frame (s)."""
 
 
 class SimulatedCamera:
@@ -56,30 +55,32 @@ class SimulatedCamera:
         control_dt: float,
         estimates: bool,
     ) -> None:
-        self.control_dt = control_dt
-        self.tracked = slice(scene.bodies.paddles, scene.bodies.movers)
+        bodies, table, b = scene.bodies, scene.table, num_worlds
+        self.tracked = slice(bodies.paddles, bodies.movers)
         """Indices of the bodies that it sees: pucks and blocks."""
-        self.pucks, self._puck_radius = scene.bodies.pucks, scene.table.puck_radius
-        count = self.tracked.stop - self.tracked.start
-        shape = (num_worlds, count, 2)
+        self.pucks, self._puck_radius = bodies.pucks, table.puck_radius
+        n = self.tracked.stop - self.tracked.start
         longest = physics.highest("observation_delay")
         longest += physics.highest("observation_jitter")
-        self.delay = TrajectoryDelay(longest, control_dt, shape[:2])
-        self._extent = np.abs(np.asarray(scene.table.vertices)).max(0)
-        self._map = CalibrationMap(num_worlds, 2 * self._extent[1])
-        self._maps = physics.any_of("calibration_error")
-        self._occlusion = Occlusion(scene, num_worlds, control_dt)
-        self._hides = physics.any_of("occlusion")
-        self._errs = physics.any_of("false_detection")
-        estimator = Estimator(scene, num_worlds, physics, control_dt)
-        self._estimator = estimator if estimates else None
-        self._contacts = ContactSensor(scene, num_worlds, control_dt)
+        extent = np.abs(np.asarray(table.vertices)).max(0)
+        self.calibration = CalibrationMap(b, 2 * extent[1])
         stored = max(round(PAST / control_dt), 2)
-        self._paddles = np.zeros((num_worlds, stored, scene.bodies.paddles, 2))
-        self._position, self._velocity = np.zeros(shape), np.zeros(shape)
-        self._taken = np.zeros((num_worlds, count))
-        """Time of the last frame in which a body was visible, s"""
-        self._visible = np.ones((num_worlds, self.pucks), np.bool_)
+        self._view = frame.View(
+            past=np.zeros((b, depth(longest, control_dt), n, 4)),
+            paddles=np.zeros((b, stored, bodies.paddles, 2)),
+            waves=self.calibration.waves,
+            unhidden=np.ones((b, self.pucks), np.bool_),
+            seen=np.zeros((b, n, 4)),
+            taken=np.zeros((b, n)),
+            visible=np.ones((b, self.pucks), np.bool_),
+            bases=bases(scene),
+            extent=extent,
+            control_dt=control_dt,
+        )
+        estimator = Estimator(scene, b, physics, control_dt)
+        self._estimator = estimator if estimates else None
+        self._contacts = ContactSensor(scene, b, control_dt)
+        self._all = np.arange(b)
 
     def begin(
         self, worlds: Array, values: Mapping[str, Array], streams: StreamSet
@@ -91,9 +92,8 @@ class SimulatedCamera:
             values: Physical parameters by name, (B,) each.
             streams: Streams of the worlds, "sensor" among them.
         """
-        if self._maps:
-            sd = values["calibration_error"][worlds]
-            self._map.sample(streams.of("sensor", worlds), sd, worlds)
+        sd = values["calibration_error"][worlds]
+        self.calibration.sample(streams.of("sensor", worlds), sd, worlds)
 
     def reset(self, worlds: Array, state: State, values: Mapping[str, Array]) -> None:
         """Replace the past in some worlds by that of bodies at constant velocity.
@@ -104,25 +104,21 @@ class SimulatedCamera:
             values: Physical parameters by name, (B,) each.
         """
         position = state.position[worlds, self.tracked]
-        velocity, dt = state.velocity[worlds, self.tracked], self.control_dt
-        self.delay.fill(worlds, _past(position, velocity, self.delay.depth, dt))
-        age = values["observation_delay"][worlds] + self.control_dt
-        seen = position - velocity * age[:, None, None]
-        self._position[worlds] = self._map.shifted(seen, worlds)
-        self._velocity[worlds] = velocity
-        self._taken[worlds] = (state.time[worlds] - age)[:, None]
-        self._visible[worlds] = True
-        self._occlusion.reset(worlds)
+        velocity, view = state.velocity[worlds, self.tracked], self._view
+        steps, dt = view.past.shape[1], view.control_dt
+        view.past[worlds] = _past(position, velocity, steps, dt)
+        view.paddles[worlds] = state.paddle[worlds, None]
+        age = values["observation_delay"][worlds] + dt
+        then = position - velocity * age[:, None, None]
+        view.seen[worlds, :, :2] = self.calibration.shifted(then, worlds)
+        view.seen[worlds, :, 2:] = velocity
+        view.taken[worlds] = (state.time[worlds] - age)[:, None]
+        view.visible[worlds] = view.unhidden[worlds] = True
         if self._estimator is not None:
-            pucks = slice(0, self.pucks)
-            self._estimator.reset(
-                worlds,
-                self._position[worlds, pucks],
-                velocity[:, pucks],
-                self._taken[worlds, pucks],
-            )
-        self._contacts.reset(worlds, self._tracks[worlds])
-        self._paddles[worlds] = state.paddle[worlds, None]
+            seen = view.seen[worlds, : self.pucks]
+            taken = view.taken[worlds, : self.pucks]
+            self._estimator.reset(worlds, seen[..., :2], seen[..., 2:], taken)
+        self._contacts.reset(worlds, *self._tracks)
 
     @property
     def estimates(self) -> bool:
@@ -130,13 +126,11 @@ class SimulatedCamera:
         return self._estimator is not None
 
     @property
-    def _tracks(self) -> Array:
-        """(B, pucks, 5) time, s, position, m, velocity, m/s, in the last frames."""
+    def _tracks(self) -> tuple[Array, Array]:
+        """Times of the bodies' last frames and positions and velocities in them."""
         if self._estimator is not None:
             return self._estimator.tracks
-        pucks = slice(0, self.pucks)
-        seen = self._position[:, pucks], self._velocity[:, pucks]
-        return np.concatenate([self._taken[:, pucks, None], *seen], -1)
+        return self._view.taken, self._view.seen
 
     def look(
         self,
@@ -151,14 +145,18 @@ class SimulatedCamera:
             The state as the camera sees it, and the ages of the pucks' positions,
             (B, pucks), s.
         """
-        self._update(state, values, streams.of("sensor").select(rows), rows)
-        position, velocity = state.position.copy(), state.velocity.copy()
-        position[:, self.tracked] = self._position
-        velocity[:, self.tracked] = self._velocity
+        self._update(state, values, streams, rows)
+        position, velocity, view = (
+            state.position.copy(),
+            state.velocity.copy(),
+            self._view,
+        )
+        position[:, self.tracked] = view.seen[..., :2]
+        velocity[:, self.tracked] = view.seen[..., 2:]
         # A camera sees the centre of a puck, not its spin.
         spin = state.spin.copy()
         spin[:, self.tracked] = 0.0
-        visible = state.visible & self._visible
+        visible = state.visible & view.visible
         found = self._contacts
         sensed = replace(
             state,
@@ -170,7 +168,7 @@ class SimulatedCamera:
             touched_at=found.touched_at.copy(),
             touching=found.touching.copy(),
         )
-        return sensed, state.time[:, None] - self._taken[:, : self.pucks]
+        return sensed, state.time[:, None] - view.taken[:, : self.pucks]
 
     def estimated(self, sensed: State) -> State:
         """Return a sensed state with the estimates of the pucks for now.
@@ -191,53 +189,22 @@ class SimulatedCamera:
         self,
         state: State,
         values: Mapping[str, Array],
-        rng: RandomStreams,
+        streams: StreamSet,
         rows: Rows,
     ) -> None:
-        """Update the sensed positions and velocities in some worlds by a frame."""
-        age = values["observation_delay"][rows]
-        age = age + values["observation_jitter"][rows] * rng.uniform(0.0, 1.0)
-        now = state.position[rows, self.tracked], state.velocity[rows, self.tracked]
-        then = self.delay.push_sample(np.concatenate(now, -1), age, rows)
-        seen = self._map.shifted(then, rows) if self._maps else then.copy()
-        noise = values["position_noise"][rows][:, None, None]
-        seen += noise * rng.normal(*seen.shape[1:])
-        visible = np.ones((len(seen), seen.shape[1]), np.bool_)
-        found = visible[:, : self.pucks]
-        if self._hides:
-            arms, share = state.paddle[rows], values["occlusion"][rows]
-            pucks = then[:, : self.pucks]
-            found[:] = self._occlusion.sample_visible(pucks, arms, share, rng, rows)
-        if self._errs:
-            wrong = rng.uniform(0.0, 1.0, self.pucks)
-            wrong = wrong < values["false_detection"][rows][:, None]
-            elsewhere = self._extent * rng.uniform(-1.0, 1.0, self.pucks, 2)
-            np.copyto(seen[:, : self.pucks], elsewhere, where=wrong[..., None])
-            found |= wrong
-        taken = (state.time[rows] - age)[:, None]
-        since = taken - self._taken[rows]
-        fresh = visible & (since > SAME_FRAME)
-        last, velocity = self._position[rows], self._velocity[rows]
-        moved = (seen - last) / np.maximum(since, SAME_FRAME)[..., None]
-        self._velocity[rows] = np.where(fresh[..., None], moved, velocity)
-        self._position[rows] = np.where(fresh[..., None], seen, last)
-        self._taken[rows] = np.where(fresh, taken, self._taken[rows])
-        self._visible[rows] = found
-        paddles = self._paddles[rows]
-        paddles[:, :-1], paddles[:, -1] = paddles[:, 1:].copy(), state.paddle[rows]
-        self._paddles[rows] = paddles
+        """Update what is seen in some worlds by a frame."""
+        view, worlds, now = self._view, self._all[rows], state.time
+        w, n = len(worlds), view.seen.shape[1]
+        units = streams.of("sensor", worlds).units(frame.numbers(n, self.pucks))
+        errors = frame.Errors(*(values[name] for name in frame.Errors._fields))
+        newest = frame.Newest(
+            np.empty((w, n, 2)), np.empty(w), np.empty((w, n), np.bool_)
+        )
+        true = state.position, state.velocity, now
+        frame.take(worlds, units, *true, errors, view, newest)
         if self._estimator is not None:
-            # Contiguous with and without blocks, so that one version is compiled.
-            pucks_of = slice(0, self.pucks)
-            self._estimator.update(
-                np.arange(len(state.time))[rows],
-                np.ascontiguousarray(seen[:, pucks_of]),
-                taken[:, 0],
-                np.ascontiguousarray(fresh[:, pucks_of]),
-                paddles,
-                state.time[rows],
-            )
-        self._contacts.update(self._tracks[rows], paddles, state.time[rows], rows)
+            self._estimator.update(worlds, *newest, view.paddles, now)
+        self._contacts.update(worlds, *self._tracks, view.paddles, now)
 
 
 def _past(position: Array, velocity: Array, steps: int, control_dt: float) -> Array:

@@ -7,7 +7,8 @@ One world at a time: our dict environment, a bare loop of pymunk's own step over
 very same world (paddle velocities set, pucks put back as often as episodes restart),
 PettingZoo's multiwalker (pip install box2d) and mpe2's simple_tag. Many at a time: our
 arrays, and VMAS and JaxMARL, each in an interpreter of its own that works only in its
-rounds, on one thread as ours does. Actions are drawn beforehand; resets are included.
+rounds, on one thread as ours does. Their scenarios have four agents, so they are
+compared with our doubles. Actions are drawn beforehand; resets are included.
 VMAS has no automatic reset: its worlds are reset all together every 100 steps, which
 costs it least. Rates are per CPU-second of the process that steps, which a busy machine
 disturbs less than wall time; ratios are medians over the rounds.
@@ -46,6 +47,8 @@ MeasureRound = Callable[[float], dict[str, float]]
 CHUNK = 512
 """Steps of one world between two looks at the clock."""
 PYMUNK_WORLDS, WORLDS = 256, 4096
+ONE, MANY, FOUR = "env-steps", "agent-steps", "agent-steps of four agents"
+"""What is compared: one world, many worlds, many worlds of four agents"""
 ONE_THREAD = {
     "JAX_PLATFORMS": "cpu",
     "OMP_NUM_THREADS": "1",
@@ -268,7 +271,7 @@ class Row:
     name: str
     measure_round: MeasureRound
     unit: str
-    """What is compared: "env-steps" with one world, "agent-steps" with many"""
+    """What is compared, `ONE`, `MANY` or `FOUR`"""
     found: list[dict[str, float]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -287,11 +290,11 @@ class Row:
                 for measure_round in self.found
             ]
         )
-        return rates * self.agents if unit == "agent-steps" else rates
+        return rates if unit == ONE else rates * self.agents
 
     def to_json(self, mine: Row) -> dict[str, Any]:
         """Medians, and how many times faster ours is."""
-        steps = self.rates("env-steps")
+        steps = self.rates(ONE)
         ratio = mine.rates(self.unit) / self.rates(self.unit)
         return {
             "name": self.name,
@@ -325,15 +328,17 @@ def rows(
     """
     out = []
     many = f"ours, {WORLDS} worlds, numba"
+    doubles = f"ours, {WORLDS} worlds of doubles"
     few = f"ours, {PYMUNK_WORLDS} worlds, pymunk"
     here: list[tuple[str, str, Callable[[], Made]]] = [
-        ("ours, dict env, numba", "env-steps", lambda: ours(scenario, "numba")),
-        ("ours, dict env, pymunk", "env-steps", lambda: ours(scenario, "pymunk")),
-        ("bare pymunk steps", "env-steps", lambda: bare(scenario)),
-        ("multiwalker", "env-steps", multiwalker),
-        ("mpe2 simple_tag", "env-steps", simple_tag),
-        (many, "agent-steps", lambda: worlds(scenario, "numba", WORLDS)),
-        (few, "agent-steps", lambda: worlds(scenario, "pymunk", PYMUNK_WORLDS)),
+        ("ours, dict env, numba", ONE, lambda: ours(scenario, "numba")),
+        ("ours, dict env, pymunk", ONE, lambda: ours(scenario, "pymunk")),
+        ("bare pymunk steps", ONE, lambda: bare(scenario)),
+        ("multiwalker", ONE, multiwalker),
+        ("mpe2 simple_tag", ONE, simple_tag),
+        (many, MANY, lambda: worlds(scenario, "numba", WORLDS)),
+        (few, MANY, lambda: worlds(scenario, "pymunk", PYMUNK_WORLDS)),
+        (doubles, FOUR, lambda: worlds("doubles", "numba", WORLDS)),
     ]
     for name, unit, make in here:
         try:
@@ -348,12 +353,12 @@ def rows(
     for name, python, make_peer, theirs, option in away:
         if python is not None:
             measure_round = peer(stack, python, make_peer, theirs, number, option)
-            out.append(Row(f"{name}, {number} worlds", measure_round, "agent-steps"))
+            out.append(Row(f"{name}, {number} worlds", measure_round, FOUR))
     return out
 
 
 def show(found: list[dict[str, Any]], title: str) -> Table:
-    """Return a table, with a line between env-steps and agent-steps."""
+    """Return a table, with a line between units."""
     ours = {row["compared"]: row["ours"] for row in found}
     units = "; ".join(f"{unit} of {name}" for unit, name in ours.items())
     table = Table("", title=title, caption=f"ours: {units}")

@@ -127,15 +127,15 @@ def test_a_serve_keeps_the_map_of_the_episode():
     state, memory = world.get_state()
     state.position[:, 2], state.velocity[:, 2] = (0.80, 0.0), (2.0, 0.0)
     state.position[:, 1] = (0.6, 0.25)
-    place = np.zeros((1, 1, 2))
-    before = world.sensor.camera._map.shifted(place, slice(None))
+    place, here = np.zeros((1, 1, 2)), np.arange(1)
+    before = world.sensor.camera.calibration.shifted(place, here)
     world.set_state(state, memory)
-    fresh = world.sensor.camera._map.shifted(place, slice(None))
+    fresh = world.sensor.camera.calibration.shifted(place, here)
     assert (fresh != before).any()
     for _ in range(3):
         world.step(np.zeros((1, 2, 2)))
     assert world.memory["goals"].sum() == 1
-    kept = world.sensor.camera._map.shifted(place, slice(None))
+    kept = world.sensor.camera.calibration.shifted(place, here)
     np.testing.assert_array_equal(kept, fresh)
 
 
