@@ -1,4 +1,4 @@
-"""Code generator: writes a tape as a loop over worlds and compiles it with numba.
+"""Code generator: writes a tape as a module with a loop and compiles it with numba.
 
 The sources are kept in the folder of compiled code (`cache`), with what numba makes of
 them, so that a loop is compiled once per machine.
@@ -28,23 +28,6 @@ Call = Callable[..., tuple[dict[str, Array], ...]]
 Name = tuple[int, str]
 """Name of an input: index of its source, and its key there."""
 
-INFIX = {
-    "add": "+",
-    "subtract": "-",
-    "multiply": "*",
-    "divide": "/",
-    "less": "<",
-    "less_equal": "<=",
-    "greater": ">",
-    "greater_equal": ">=",
-    "equal": "==",
-    "not_equal": "!=",
-    "bitwise_and": "&",
-    "bitwise_or": "|",
-}
-"""Operations that numba compiles faster as operators."""
-COMPARED = {"maximum": "<", "minimum": ">"}
-"""Comparisons by which a known number takes the place of a symbol."""
 _loaded: dict[str, Loaded] = {}
 
 
@@ -53,19 +36,19 @@ class Writer:
 
     Args:
         tape: recorded operations.
-        kinds: dtype of each input.
+        inputs: arrays (B, *) by name, of which types and shapes are used.
     """
 
-    def __init__(self, tape: Tape, kinds: Mapping[Name, Any]) -> None:
-        self._tape, self._kinds = tape, kinds
-        self._stores: list[tuple[str, Any]] = []
-        self._outputs: list[str] = []
-        """Numba types of the outputs"""
+    def __init__(self, tape: Tape, inputs: Mapping[Name, Array]) -> None:
+        self._tape, self._arrays = tape, inputs
+        self._stores: list[tuple[int, int, Any]] = []
+        """Index of an output, that of an element in its row, and what is stored"""
+        self._outputs: list[tuple[str, int]] = []
+        """Numba types of the outputs, and the sizes of their rows"""
         self._sinks: list[list[str]] = []
         self._live: set[Symbol] = set()
-        self.inputs: dict[Name, str] = {}
-        """Variables of the used inputs, by name"""
-        self._axes: dict[Name, int] = {}
+        self.inputs: dict[Name, int] = {}
+        """Indices of the used inputs, by name"""
 
     def begin_sink(self) -> None:
         """Start the next mapping of outputs."""
@@ -73,12 +56,12 @@ class Writer:
 
     def store(self, key: str, place: Array, dtype: Any) -> None:
         """Write an array of one world, (*) scalars, to a fresh output."""
-        variable = f"o{len(self._outputs)}"
-        self._outputs.append(_type(dtype, 1 + place.ndim))
-        self._sinks[-1].append(f"{key!r}: {variable}")
-        for index in np.ndindex(place.shape):
-            self._stores.append((_element(variable, index), place[index]))
-            self._mark(place[index])
+        output = len(self._outputs)
+        self._outputs.append((_type(dtype, 1 + place.ndim), place.size))
+        self._sinks[-1].append(f"{key!r}: o{output}")
+        for element, scalar in enumerate(place.flat):
+            self._stores.append((output, element, scalar))
+            self._mark(scalar)
 
     def _mark(self, scalar: Any) -> None:
         """Mark the symbols that a scalar depends on as needed."""
@@ -89,31 +72,39 @@ class Writer:
                 continue
             self._live.add(symbol)
             if symbol.op == "input":
-                name, index = symbol.args
-                self.inputs.setdefault(name, f"i{len(self.inputs)}")
-                self._axes[name] = 1 + len(index)
+                self.inputs.setdefault(symbol.args[0], len(self.inputs))
             else:
                 waiting += symbol.args
 
     def source(self, sources: int) -> str:
         """Return the source of the module for a number of sources."""
         live = [s for s in self._tape.symbols.values() if s in self._live]
-        names = {symbol: f"t{i}" for i, symbol in enumerate(live)}
-        body = [f"{names[s]} = {self._expression(s, names)}" for s in live]
-        body += [f"{place} = {_named(s, names)}" for place, s in self._stores]
-        types = [_type(self._kinds[n], self._axes[n]) for n in self.inputs]
-        outputs = [f"o{i}" for i in range(len(self._outputs))]
-        given = [_lookup(name) for name in self.inputs]
-        variables = [*self.inputs.values(), *outputs]
+        index = {symbol: k for k, symbol in enumerate(live)}
+        arrays, first = [self._arrays[name] for name in self.inputs], len(self.inputs)
+        types = [_type(a.dtype, a.ndim) for a in arrays]
+        types += [kind for kind, _ in self._outputs]
+        sizes = [a[0].size for a in arrays] + [size for _, size in self._outputs]
+        inputs = [f"i{k}" for k in range(first)]
+        outputs = [f"o{k}" for k in range(len(self._outputs))]
+        variables = ", ".join([*inputs, *outputs])
+        given = [f"s{i}[{key!r}]" for i, key in self.inputs]
         sinks = ", ".join("{" + ", ".join(sink) + "}" for sink in self._sinks)
         lines = [
             '"""Written by marl_airhockey.jit.codegen; may be deleted at any time."""',
             "import numpy as np",
             "from numpy import inf, nan",
-            f"SIGNATURE = 'void({', '.join([*types, *self._outputs])})'",
-            f"def kernel({', '.join(variables)}):",
-            f"    for b in range({variables[0]}.shape[0]):",
-            *(f"        {line}" for line in body),
+            "from marl_airhockey.jit.lowering import loop",
+            f"SIGNATURE = 'void({', '.join(types)})'",
+            f"run = loop({sizes}, [",
+            *(f"    {self._operation(symbol, index)}," for symbol in live),
+            "], [",
+            *(
+                f"    ({first + o}, {k}, {_named(s, index)}),"
+                for o, k, s in self._stores
+            ),
+            "])",
+            f"def kernel({variables}):",
+            f"    run(({variables},))",
             f"def call(kernel, outputs, {', '.join(f's{i}' for i in range(sources))}):",
             f"    ({', '.join(outputs)},) = outputs",
             f"    kernel({', '.join([*given, *outputs])})",
@@ -121,41 +112,19 @@ class Writer:
         ]
         return "\n".join(lines) + "\n"
 
-    def _expression(self, symbol: Symbol, names: dict[Symbol, str]) -> str:
-        """Return a symbol as an expression of numba."""
-        op = symbol.op
-        if op == "input":
-            name, index = symbol.args
-            return _element(self.inputs[name], index)
-        args = [_named(a, names) for a in symbol.args]
-        if op == "where":
-            return f"{args[1]} if {args[0]} else {args[2]}"
-        truths = all(_is_truth(a) for a in symbol.args)
-        if op == "invert" and truths:
-            return f"not {args[0]}"
-        if op in COMPARED and not isinstance(symbol.args[1], Symbol):
-            # As np.maximum and np.minimum, nan included, and faster.
-            return f"{args[1]} if {args[0]} {COMPARED[op]} {args[1]} else {args[0]}"
-        if op in INFIX and not (truths and op in ("add", "multiply")):
-            return f" {INFIX[op]} ".join(args)
-        return f"np.{op}({', '.join(args)})"
+    def _operation(self, symbol: Symbol, index: Mapping[Symbol, int]) -> str:
+        """Return a symbol as `lowering.Operation`."""
+        if symbol.op == "input":
+            name, place = symbol.args
+            element = np.ravel_multi_index(place, self._arrays[name].shape[1:])
+            return f"('input', {self.inputs[name]}, {element})"
+        args = "".join(f", {_named(a, index)}" for a in symbol.args)
+        return f"({symbol.op!r}{args})"
 
 
-def _lookup(name: Name) -> str:
-    return f"s{name[0]}[{name[1]!r}]"
-
-
-def _element(variable: str, index: tuple[int, ...]) -> str:
-    return f"{variable}[{', '.join(map(str, ('b', *index)))}]"
-
-
-def _named(scalar: Any, names: dict[Symbol, str]) -> str:
-    return names[scalar] if isinstance(scalar, Symbol) else repr(scalar)
-
-
-def _is_truth(scalar: Any) -> bool:
-    value = scalar.value if isinstance(scalar, Symbol) else scalar
-    return isinstance(value, (bool, np.bool_))
+def _named(scalar: Any, index: Mapping[Symbol, int]) -> str:
+    """Return a scalar as `lowering.Argument`."""
+    return str(index[scalar]) if isinstance(scalar, Symbol) else f"({scalar!r},)"
 
 
 def _type(dtype: Any, axes: int) -> str:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numba.core.config import DISABLE_JIT  # type: ignore[attr-defined]
 
 from marl_airhockey.jit.buffers import BufferPool
 from marl_airhockey.jit.codegen import Loaded, Writer, load
@@ -53,7 +54,7 @@ class Fused:
     def prepare(self, *sources: Source) -> tuple[Sink, ...]:
         """Compile for arrays like these; return their sinks, freshly allocated."""
         plain = self._function(*sources)
-        off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0"
+        off = os.environ.get("MARL_AIRHOCKEY_COMPILE", "1") == "0" or DISABLE_JIT
         if self._loop is None and self.refused is None and not off:
             try:
                 loop = _Loop(self._function, sources, plain, self._name)
@@ -139,7 +140,7 @@ class _Loop:
                     arrays[i, key] = value
                     row[key] = tape.array((i, key), value[0])
             symbolic.append(row)
-        writer = Writer(tape, {name: a.dtype for name, a in arrays.items()})
+        writer = Writer(tape, arrays)
         outputs: list[tuple[tuple[int, ...], Any]] = []
         for sink, real in zip(function(*symbolic), plain, strict=True):
             writer.begin_sink()
