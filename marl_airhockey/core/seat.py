@@ -50,16 +50,19 @@ def make_seat(
         raise ValueError(f"seats: {kind!r} is unknown; there are {SEAT_KINDS}")
     edge = -float(table.offsets[side])
     ego = table.rotation(side).T
+    # From the own side on, so that the numbers of opposite seats are the same.
+    count = len(table.vertices)
+    order = [(side + k) % count for k in range(count)]
     normals = table.normals @ ego
     if kind == "robot":
         polygon, speed, acceleration = np.array(table.robot_reach), 0.7, 7.0
         polygon[:, 0] += edge
     else:
-        polygon, speed, acceleration = np.asarray(table.vertices) @ ego, 5.0, 50.0
-    for normal, offset in zip(normals, table.offsets, strict=True):
-        polygon = clip(polygon, normal, offset - table.paddle_radius)
+        polygon, speed, acceleration = np.array(table.vertices)[order] @ ego, 5.0, 50.0
+    for k in order:
+        polygon = clip(polygon, normals[k], table.offsets[k] - table.paddle_radius)
     own = np.array([1.0, 0.0])
-    rivals = [other for other in others if other != side]
+    rivals = [other for other in order[1:] if other in others]
     for other in rivals:
         # Points nearer to the own side than to the other, less the paddle's radius.
         toward, gap = normals[other] - own, table.offsets[other] - table.offsets[side]
