@@ -55,6 +55,13 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
         counts[rows[i]] = count + np.uint64(n)
 
 
+@compiled(nogil=True, error_model="numpy")
+def normal_pair(first: float, second: float) -> tuple[float, float]:
+    """Return two standard normal numbers of two uniform ones (Box and Muller)."""
+    radius, phase = math.sqrt(-2.0 * math.log1p(-first)), 2.0 * math.pi * second
+    return radius * math.cos(phase), radius * math.sin(phase)
+
+
 def _is_seed(value: Any) -> bool:
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     return whole and 0 <= value < 2**64

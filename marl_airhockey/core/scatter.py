@@ -7,12 +7,10 @@ on two real tables, see the documentation of the physics.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from marl_airhockey.core.parameters import SLOWEST_BOUNCE
-from marl_airhockey.core.rng import GOLDEN, mix
+from marl_airhockey.core.rng import GOLDEN, mix, normal_pair
 from marl_airhockey.jit.cache import compiled
 
 TAIL, WIDER = 0.05, 5.0
@@ -33,9 +31,8 @@ def draw(key: np.uint64, number: int, place: int) -> tuple[float, float, float]:
     first = mix(mix(key + np.uint64(number + 1) * GOLDEN) ^ np.uint64(place))
     second, third = mix(first + GOLDEN), mix(first + GOLDEN + GOLDEN)
     units = (first >> _11) * _UNIT, (second >> _11) * _UNIT, (third >> _11) * _UNIT
-    radius = math.sqrt(-2.0 * math.log1p(-units[0]))
-    phase = 2.0 * math.pi * units[1]
-    return radius * math.cos(phase), radius * math.sin(phase), units[2]
+    one, two = normal_pair(units[0], units[1])
+    return one, two, units[2]
 
 
 @compiled(nogil=True, error_model="numpy")

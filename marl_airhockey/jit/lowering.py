@@ -1,8 +1,8 @@
 """Lowering: recorded operations as a loop over worlds, written directly for LLVM.
 
 Numba needs 7 ms for each line of Python that it compiles, and in functions of thousands
-of lines several times as much; what it makes of a single operation on scalars takes a
-hundredth of that. So a loop is not written as Python: each of its operations is typed
+of lines several times as much; its translation of a single operation on scalars takes a
+small part of that. So a loop is not written as Python: each of its operations is typed
 and translated by numba's own rules, as if it stood in a line of Python.
 """
 
@@ -43,7 +43,7 @@ OPERATORS: dict[str, Callable[..., Any]] = {
 }
 """Operations for which numba has faster rules than for numpy's functions"""
 COMPARED = {"maximum": operator.lt, "minimum": operator.gt}
-"""Comparisons by which a known number takes the place of a value"""
+"""Comparisons by which a known number replaces a value"""
 
 
 class Value(NamedTuple):

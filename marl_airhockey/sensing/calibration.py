@@ -57,10 +57,8 @@ class CalibrationMap:
         unit, waves = rng.units(3, WAVES, 2), self.waves
         low, high = (2.0 * np.pi / (self._width * length) for length in LENGTHS[::-1])
         number = low + (high - low) * unit[:, 0]
-        heading, waves.phase[worlds] = (
-            2.0 * np.pi * unit[:, 1],
-            2.0 * np.pi * unit[:, 2],
-        )
+        heading = 2.0 * np.pi * unit[:, 1]
+        waves.phase[worlds] = 2.0 * np.pi * unit[:, 2]
         waves.x[worlds] = number * np.cos(heading)
         waves.y[worlds] = number * np.sin(heading)
         waves.height[worlds] = sd * np.sqrt(2.0 / WAVES)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.core.rng import normal_pair
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.sensing.calibration import Waves, shift
 from marl_airhockey.sensing.delay import append, position_before
@@ -110,7 +111,7 @@ def take(
             here = shift(view.waves, w, x, y)
             for axis in range(2):
                 first = 1 + 2 * k + axis
-                noise = _normal(unit[first], unit[first + 2 * tracked])
+                noise, _ = normal_pair(unit[first], unit[first + 2 * tracked])
                 at = here[axis] + errors.position_noise[w] * noise
                 newest.position[row, k, axis] = at
             if k < pucks:
@@ -149,10 +150,3 @@ def _detect(
             elsewhere = 2.0 * unit[2 * pucks + 2 * k + axis] - 1.0
             newest.position[row, k, axis] = view.extent[axis] * elsewhere
     view.visible[w, k] = view.unhidden[w, k] or wrong
-
-
-@compiled(nogil=True, error_model="numpy")
-def _normal(first: float, second: float) -> float:
-    """Return a standard normal number of two uniform ones (Box and Muller)."""
-    radius = np.sqrt(-2.0 * np.log1p(-first))
-    return float(radius * np.cos(2.0 * np.pi * second))

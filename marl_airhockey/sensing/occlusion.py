@@ -22,7 +22,7 @@ were within it, or at the far rail."""
 
 
 def bases(scene: Scene) -> Array:
-    """Return where the arms stand: (seats, 2) the middles of the seats' sides, m."""
+    """Return the positions (seats, 2) of the arms: the middles of their sides, m."""
     ends = [scene.table.ends(seat.side) for seat in scene.seats]
     return np.array([(start + end) / 2 for start, end in ends])
 

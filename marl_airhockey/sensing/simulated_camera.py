@@ -146,11 +146,8 @@ class SimulatedCamera:
             (B, pucks), s.
         """
         self._update(state, values, streams, rows)
-        position, velocity, view = (
-            state.position.copy(),
-            state.velocity.copy(),
-            self._view,
-        )
+        view, position = self._view, state.position.copy()
+        velocity = state.velocity.copy()
         position[:, self.tracked] = view.seen[..., :2]
         velocity[:, self.tracked] = view.seen[..., 2:]
         # A camera sees the centre of a puck, not its spin.

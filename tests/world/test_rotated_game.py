@@ -1,4 +1,4 @@
-"""A duel turned around is the same duel, bit for bit, until a puck is served again."""
+"""A rotated duel is the same duel, bit for bit, until a puck is served."""
 
 from dataclasses import replace
 
@@ -18,15 +18,15 @@ def duels(**keywords):
     return world
 
 
-def turned(state):
-    """Return a state turned by half a circle around the middle of the table."""
+def rotated(state):
+    """Return a state rotated by 180 degrees around the middle of the table."""
     place, motion = state.position[:, OTHER], state.velocity[:, OTHER]
     return replace(state, position=0.0 - place, velocity=0.0 - motion)
 
 
-def test_a_duel_that_is_turned_around_has_the_same_bits():
+def test_a_rotated_duel_has_the_same_bits():
     one, two = (duels(physics={"tilt": 0.0}) for _ in range(2))
-    two.set_state(turned(one.state), two.memory)
+    two.set_state(rotated(one.state), two.memory)
     actions = np.random.default_rng(0).uniform(-1, 1, (STEPS, WORLDS, 2, 2))
     played, contacts = np.ones(WORLDS, np.bool_), 0
     for action in actions:
@@ -35,7 +35,7 @@ def test_a_duel_that_is_turned_around_has_the_same_bits():
         # Pucks are served at x = 0, and the sine of their heading is rounded.
         played &= one.state.puck[:, 0, 0] != 0.0
         contacts += one.state.touched[played].sum() + one.state.banked[played].sum()
-        found = turned(two.state)
+        found = rotated(two.state)
         for name in ("position", "velocity"):
             real, other = getattr(one.state, name), getattr(found, name)
             np.testing.assert_array_equal(other[played], real[played])
