@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.core.parameters import PUCK_SPEED_CAP, SLOWEST_BOUNCE
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 Motion = tuple[float, float, float, float]
@@ -40,7 +40,7 @@ def fly(
     return fly_slowed(vx, vy, h, time, gx, gy, damping, drag)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def fly_slowed(
     vx: float,
     vy: float,
@@ -110,7 +110,7 @@ def wall_restitution(speed: float, at_one: float, slope: float) -> float:
     return float(min(max(share, 0.0), 1.0))
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def impulse(
     speed: float,
     slip: float,

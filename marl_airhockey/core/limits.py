@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.core.seat import ReachPlanes
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.jit.pipeline import Fixed, Stage
 from marl_airhockey.types import Array
 
@@ -209,7 +209,7 @@ def away(obstacle: Array, x: float, y: float) -> tuple[float, float, float]:
     return nx / gap, ny / gap, gap - obstacle[4]
 
 
-@compiled(error_model="numpy")
+@inner(error_model="numpy")
 def _within(wx: float, wy: float, dx: float, dy: float, most: float) -> float:
     """Return the largest share s in 0..1 with |(dx, dy) + s (wx, wy)| <= most."""
     a = max(wx * wx + wy * wy, 1e-18)

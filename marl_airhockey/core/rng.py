@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
@@ -24,7 +24,7 @@ _MIX_2 = np.uint64(0x94D049BB133111EB)
 _30, _27, _31, _11 = (np.uint64(n) for n in (30, 27, 31, 11))
 
 
-@compiled()
+@inner()
 def mix(z: Any) -> Any:
     """Return the hash of a 64-bit number."""
     z = (z ^ (z >> _30)) * _MIX_1
@@ -55,7 +55,7 @@ def _unit(keys: Array, counts: Array, rows: Array, out: Array) -> None:
         counts[rows[i]] = count + np.uint64(n)
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def normal_pair(first: float, second: float) -> tuple[float, float]:
     """Return two standard normal numbers of two uniform ones (Box and Muller)."""
     radius, phase = math.sqrt(-2.0 * math.log1p(-first)), 2.0 * math.pi * second

@@ -9,7 +9,7 @@ in plain Python run between them. Both give the same numbers.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -106,56 +106,74 @@ class _Compiled:
     """Stages as one compiled function, whose rows several threads may share."""
 
     def __init__(self, rows: int, stages: Sequence[Stage], name: str) -> None:
-        self._rows, self._stages = rows, stages
-        """Stages, kept because the addresses are those of their arrays."""
-        arrays = list(_arrays(stages))
-        self._addresses = np.array([a.ctypes.data for a, _ in arrays], np.int64)
-        self._strides = np.array([s * a.strides[0] for a, s in arrays], np.int64)
+        inputs = _Inputs()
+        source = _source(stages, inputs)
+        self._rows, self._inputs = rows, inputs
+        self._where = np.array(inputs.values, np.int64)
+        self._strides = np.array(inputs.strides, np.int64)
         functions = {f"f{i}": stage.function for i, stage in enumerate(stages)}
-        self._kernel = load(_source(stages), name, functions).kernel
+        self._kernel = load(source, name, functions).kernel
 
     def __call__(self) -> bool:
         if self._rows < 2 * LEAST:
-            return bool(self._kernel(self._addresses, self._rows))
+            return bool(self._kernel(self._where, self._rows))
         going: list[bool] = []
 
         def work(rows: slice) -> None:
             first, end, _ = rows.indices(self._rows)
-            where = self._addresses + first * self._strides
+            where = self._where + first * self._strides
             going.append(bool(self._kernel(where, end - first)))
 
         over_rows(work, self._rows)
         return all(going)
 
 
-def _arrays(stages: Sequence[Stage]) -> Iterator[tuple[Array, int]]:
-    """Yield each array of the arguments, with 1 if it has rows of worlds, else 0."""
-    for stage in stages:
-        for argument in stage.arguments:
-            array = argument.array if isinstance(argument, Fixed) else argument
-            if isinstance(array, np.ndarray):
-                assert array.flags.c_contiguous, "rows must lie one behind the other"
-                yield array, int(array is argument)
+class _Inputs:
+    """Integers that a pipeline's function reads: addresses and lengths of its arrays.
+
+    As they are no part of its source, scenes of different sizes share what is compiled.
+    """
+
+    def __init__(self) -> None:
+        self.values: list[int] = []
+        self.strides: list[int] = []
+        """By how much each grows from one world to the next"""
+        self._arrays: list[Array] = []
+        """Arrays whose addresses these are"""
+
+    def array(self, array: Array, shared: bool) -> str:
+        """Return the expression of an array, one of whose rows is of each world."""
+        assert array.flags.c_contiguous, "rows must lie one behind the other"
+        self._arrays.append(array)
+        address = self.number(array.ctypes.data, 0 if shared else array.strides[0])
+        axes = [self.number(length) for length in array.shape[not shared :]]
+        shape = ", ".join(axes if shared else ["n", *axes])
+        kind = "bool_" if array.dtype == np.bool_ else array.dtype.name
+        return f"carray(pointer({address}), ({shape},), np.{kind})"
+
+    def number(self, value: int, stride: int = 0) -> str:
+        """Return the expression of an integer."""
+        self.values.append(value)
+        self.strides.append(stride)
+        return f"where[{len(self.values) - 1}]"
 
 
-def _source(stages: Sequence[Stage]) -> str:
-    """Return the source of a pipeline, the same for any number of worlds."""
+def _source(stages: Sequence[Stage], inputs: _Inputs) -> str:
+    """Return the source of a pipeline, the same for all sizes, and list its inputs."""
     views: list[str] = []
     calls: list[str] = []
     for i, stage in enumerate(stages):
         names = []
         for argument in stage.arguments:
             array = argument.array if isinstance(argument, Fixed) else argument
-            if not isinstance(array, np.ndarray):
+            if isinstance(array, np.ndarray):
+                names.append(f"a{len(views)}")
+                found = inputs.array(array, shared=array is not argument)
+                views.append(f"{names[-1]} = {found}")
+            elif type(array) is int:
+                names.append(inputs.number(array))
+            else:
                 names.append(repr(array))
-                continue
-            k, axes = len(views), [str(length) for length in array.shape]
-            if array is argument:
-                axes[0] = "n"
-            kind = "bool_" if array.dtype == np.bool_ else array.dtype.name
-            shape = f"({', '.join(axes)},)"
-            views.append(f"a{k} = carray(pointer(where[{k}]), {shape}, np.{kind})")
-            names.append(f"a{k}")
         call = f"f{i}({', '.join(names)})"
         calls += [f"if not {call}:", "    return False"] if stage.stops else [call]
     lines = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array, Rows
 
 
@@ -49,7 +49,7 @@ def _push(past: Array, value: Array, delay: Array, dt: float, out: Array) -> Non
             out[w, k] = share * past[w, newer, k] + (1 - share) * past[w, older, k]
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def append(past: Array, newest: Array) -> None:
     """Append a value (n,) to a past (depth, n), whose oldest value is lost."""
     for k in range(len(past) - 1):
@@ -70,7 +70,7 @@ def around(samples: int, back: float) -> tuple[int, int, float]:
     return max(newer - 1, 0), max(newer, 0), 1.0 - (back - whole)
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def position_before(past: Array, delay: float, dt: float) -> tuple[float, float]:
     """Return the position of a body ``delay`` s before its last sample, m.
 

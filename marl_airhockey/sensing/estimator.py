@@ -15,7 +15,7 @@ from marl_airhockey.core.laws import bounce, fly, wall_restitution
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.table import GRAVITY
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 STEP = 0.01
@@ -178,7 +178,7 @@ def _update(
             shown[w, p] = ahead
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _correct(
     mean: Array, spread: Array, seen: Array, since: float, doubted: bool, noise: float
 ) -> bool:
@@ -251,7 +251,7 @@ def _predict(
         _meet(mean, spread, paddles, back, known)
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _meet(
     mean: Array, spread: Array, paddles: Array, back: float, known: Surroundings
 ) -> None:

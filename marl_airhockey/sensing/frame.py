@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.core.rng import normal_pair
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.sensing.calibration import Waves, shift
 from marl_airhockey.sensing.delay import append, position_before
 from marl_airhockey.sensing.occlusion import near_arm, stays_visible
@@ -127,7 +127,7 @@ def take(
                 view.taken[w, k] = newest.taken[row]
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _detect(
     w: int,
     k: int,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 SECONDS = 0.1
@@ -27,7 +27,7 @@ def bases(scene: Scene) -> Array:
     return np.array([(start + end) / 2 for start, end in ends])
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def near_arm(x: float, y: float, bases: Array, paddles: Array) -> bool:
     """Return True for a puck near an arm.
 
@@ -50,7 +50,7 @@ def near_arm(x: float, y: float, bases: Array, paddles: Array) -> bool:
     return False
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def stays_visible(visible: bool, share: float, dt: float, unit: float) -> bool:
     """Sample whether a puck near an arm is visible now.
 

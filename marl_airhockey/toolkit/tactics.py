@@ -17,7 +17,7 @@ from marl_airhockey.core.extrapolation import Walls, extrapolate_rows
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.laws import impulse
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 
@@ -146,7 +146,7 @@ STEP, HORIZON = 0.05, 1.2
 """Time step and horizon of the prediction of a puck's path (s)."""
 
 
-@compiled(error_model="numpy")
+@inner(error_model="numpy")
 def _moved(
     x: float,
     y: float,

@@ -18,6 +18,9 @@ from marl_airhockey.backends.numba.bodies import (
 )
 from marl_airhockey.backends.numba.complementarity import complement
 from marl_airhockey.backends.numba.pushes import ALL, PADDLES, push
+from marl_airhockey.jit.cache import compiled
+
+complement, push = map(compiled(error_model="numpy"), (complement, push))
 
 
 def solved(matrix, right):

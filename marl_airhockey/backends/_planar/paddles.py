@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.contracts.backend import MAX_PRESCRIBED_SPEED
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 
@@ -87,11 +87,12 @@ def ramp_paddles(
             velocity[i, axis] += ramp
     overlap = separate_paddles(position, velocity, prescribed, raised, diameter)
     if overlap:
-        mean[:] = velocity
+        for i in range(len(mean)):
+            mean[i, 0], mean[i, 1] = velocity[i, 0], velocity[i, 1]
     return overlap
 
 
-@compiled()
+@inner()
 def separate_paddles(
     position: Array, velocity: Array, prescribed: Array, raised: Array, diameter: float
 ) -> bool:

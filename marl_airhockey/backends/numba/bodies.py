@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.backends.numba.geometry import distance_to_fixed, distance_to_point
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 X, Y, VX, VY, SPIN, ANGLE, RADIUS, MASS, EDGE = range(9)
@@ -40,7 +40,7 @@ SLOP = 2e-4
 """Overlap that is left alone (m)."""
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def hide_constant(value: int) -> int:
     """Return an integer that numba does not take for a constant.
 
@@ -49,7 +49,7 @@ def hide_constant(value: int) -> int:
     return int(np.int64(value))
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def distance_between(
     m: Array, i: int, j: int, walls: Array, obstacles: Array
 ) -> tuple[float, float, float]:
@@ -62,7 +62,7 @@ def distance_between(
     return gap - m[i, RADIUS] - m[j, RADIUS], nx, ny
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def closing(m: Array, at: int, i: int, j: int, nx: float, ny: float) -> float:
     """Return the normal speed of j from i, m/s; ``at`` is the column of velocities."""
     speed = nx * m[j, at] + ny * m[j, at + 1]
@@ -71,7 +71,7 @@ def closing(m: Array, at: int, i: int, j: int, nx: float, ny: float) -> float:
     return float(speed)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def fixed_range(
     m: Array, role: Array, j: int, held: int, edges: int, end: int
 ) -> tuple[int, int]:
@@ -93,7 +93,7 @@ def fixed_range(
     return (j * edges, (j + 1) * edges) if is_held else (0, 0)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def partner(place: int, j: int, low: int) -> int:
     """Return what comes at a place in the list of all that body j can touch.
 
@@ -102,13 +102,13 @@ def partner(place: int, j: int, low: int) -> int:
     return place if place < j else -1 - (low + place - j)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def slop(role: Array, i: int, j: int) -> float:
     """Return the overlap of body j with i that is left alone, m: none with an edge."""
     return 0.0 if i < 0 and role[j] <= PRESCRIBED else SLOP
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def shares(
     m: Array, role: Array, i: int, j: int, stops: bool
 ) -> tuple[float, float, float, float]:

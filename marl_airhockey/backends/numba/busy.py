@@ -73,7 +73,7 @@ from marl_airhockey.backends.numba.overlaps import keep_in_reach, take_apart
 from marl_airhockey.contracts.backend import PATIENCE
 from marl_airhockey.core.laws import cap, wall_restitution
 from marl_airhockey.core.scatter import at_paddle, at_wall, draw
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
 
@@ -81,7 +81,7 @@ JAMMED = 3.0
 """Factor of drifts in a jam: contacts hold, so that paths need not be as true."""
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None:
     """Move the worlds in which something may meet, from contact to contact.
 
@@ -109,7 +109,10 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
     contacts = view(at, (size, CONTACT), np.float64)
     at += 8 * size * CONTACT
     walls = view(at, (len(shared), 7), np.float64)
-    walls[:] = shared
+    # Numba takes seconds to compile an assignment of a whole array.
+    for f in range(len(shared)):
+        for column in range(shared.shape[1]):
+            walls[f, column] = shared[f, column]
     at = indices.ctypes.data
     role = view(at, (movers,), np.int64)
     at += 8 * movers

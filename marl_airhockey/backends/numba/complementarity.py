@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 SMALL = 1e-11
@@ -13,7 +13,7 @@ ERROR = 1e-8
 """Most by which an element of w may be below 0"""
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def complement(tableau: Array, names: Array, n: int) -> bool:
     """Find z >= 0 with w = M z + q >= 0 and w z = 0, by Lemke's method.
 
@@ -63,7 +63,7 @@ def complement(tableau: Array, names: Array, n: int) -> bool:
     return error < ERROR
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _first_to_vanish(tableau: Array, names: Array, column: int, n: int) -> int:
     """Return the row that is 0 first as a column's variable grows; -1 for none.
 
@@ -84,7 +84,7 @@ def _first_to_vanish(tableau: Array, names: Array, column: int, n: int) -> int:
     return found
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _exchange(tableau: Array, row: int, column: int, n: int) -> None:
     """Exchange the variables of a row and a column."""
     size = 1.0 / tableau[row, column]

@@ -51,7 +51,7 @@ from marl_airhockey.backends.numba.geometry import (
 from marl_airhockey.backends.numba.impacts import solve
 from marl_airhockey.backends.numba.near import BOW, list_near_drift
 from marl_airhockey.core.laws import fly, slide
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 REFINEMENTS = 5
@@ -62,7 +62,7 @@ LATER = 1.1
 """Share of a chord, a little beyond its end, up to which a touch is looked for."""
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def drift(
     m: Array,
     role: Array,
@@ -171,7 +171,7 @@ def drift(
     return h, stale, jam
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> float:
     """Return the longest drift in which discs that slide on each other part by `BOW`.
 
@@ -188,7 +188,7 @@ def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> 
     return float(longest)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> None:
     """Fill the mean and last velocities of a drift without contacts."""
     for i in range(len(m)):
@@ -210,7 +210,7 @@ def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> No
         m[i, DX], m[i, DY] = m[i, CX], m[i, CY]
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _first_touch(
     m: Array,
     role: Array,
@@ -260,7 +260,7 @@ def _first_touch(
     return first
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _touch_fixed(
     m: Array, j: int, f: int, walls: Array, obstacles: Array, h: float, most: float
 ) -> float:

@@ -25,7 +25,7 @@ from marl_airhockey.backends.numba.geometry import (
     stays_in_reach,
 )
 from marl_airhockey.core.laws import cap, fly_slowed
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.jit.pipeline import view
 from marl_airhockey.types import Array
 
@@ -42,13 +42,13 @@ the room around all, below 0 if something may touch; least room of a paddle in i
 reach on its way (m)."""
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def block_space(movers: int) -> Array:
     """Return the work space of `fly_freely`, owned by its caller."""
     return np.empty((movers + 1) * ROWS * WORLDS)
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def fly_freely(batch: Batch, busy: Array, work: Array) -> bool:
     """Move the worlds in which nothing can meet, and mark the others as busy.
 
@@ -84,7 +84,7 @@ def fly_freely(batch: Batch, busy: Array, work: Array) -> bool:
     return some
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _clear_events(batch: Batch) -> None:
     """Advance the clocks and clear the events of the step before."""
     result, dt = batch.result, batch.static.control_dt
@@ -99,7 +99,7 @@ def _clear_events(batch: Batch) -> None:
     _fill(result.lifted, False)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _fill(array: Array, value: float) -> None:
     # Flat and in a loop: nested loops, and for few worlds numba's own, are slower.
     flat = array.reshape(-1)
@@ -107,7 +107,7 @@ def _fill(array: Array, value: float) -> None:
         flat[i] = value
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _gather(batch: Batch, start: int, count: int, m: Array) -> None:
     """Fill the rows of a block of worlds."""
     static, coefficients, commands, previous, result = batch[:5]
@@ -146,7 +146,7 @@ def _gather(batch: Batch, start: int, count: int, m: Array) -> None:
                 m[last, ROOM, c] = -1.0
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _find_room_at_sides(batch: Batch, count: int, m: Array) -> None:
     """Find the room between pucks and what is fixed; see `list_near`."""
     static = batch.static
@@ -169,7 +169,7 @@ def _find_room_at_sides(batch: Batch, count: int, m: Array) -> None:
                 m[last, ROOM, c] = min(m[last, ROOM, c], ahead)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _find_room_in_reach(batch: Batch, count: int, m: Array) -> None:
     """Find the paddles that get out of their reaches; see `stays_in_reach`."""
     paddles, pucks, blocks, radius, walls = batch.static[:5]
@@ -193,7 +193,7 @@ def _find_room_in_reach(batch: Batch, count: int, m: Array) -> None:
                     m[last, ROOM, c] = -1.0
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _find_room_between(batch: Batch, count: int, m: Array) -> None:
     """Find the room between bodies; see `list_near`."""
     paddles, pucks, blocks, radius = batch.static[:4]
@@ -214,7 +214,7 @@ def _find_room_between(batch: Batch, count: int, m: Array) -> None:
                 m[last, ROOM, c] = min(m[last, ROOM, c], room)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def _move(batch: Batch, start: int, count: int, m: Array, busy: Array) -> None:
     """Move bodies: paddles on ramps, pucks in free flight."""
     static, coefficients, _, previous, result = batch[:5]

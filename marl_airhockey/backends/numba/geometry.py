@@ -13,7 +13,7 @@ from marl_airhockey.backends.numba.arrays import (
     OFFSET,
     SIGN,
 )
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 NEAR = 1e-4
@@ -32,7 +32,7 @@ Distance = tuple[float, float, float]
 and the unit normal there."""
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def in_contact(gap: float, speed: float) -> bool:
     """Return True if two bodies are in contact.
 
@@ -43,7 +43,7 @@ def in_contact(gap: float, speed: float) -> bool:
     return gap < TOUCH or (gap < NEAR and speed > -CREEP)
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def distance_to_point(dx: float, dy: float) -> Distance:
     """Return the distance of a point (dx, dy) from the origin."""
     distance = np.sqrt(dx * dx + dy * dy)
@@ -52,7 +52,7 @@ def distance_to_point(dx: float, dy: float) -> Distance:
     return distance, dx / distance, dy / distance
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def distance_to_wall(x: float, y: float, walls: Array, f: int) -> Distance:
     """Return the distance from wall ``f`` of `make_walls`, a convex set."""
     nx, ny = walls[f, NORMAL_X], walls[f, NORMAL_Y]
@@ -69,7 +69,7 @@ def distance_to_wall(x: float, y: float, walls: Array, f: int) -> Distance:
     return distance, across * nx - along * ny, across * ny + along * nx
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def distance_to_fixed(
     x: float, y: float, f: int, walls: Array, obstacles: Array
 ) -> Distance:
@@ -86,7 +86,7 @@ def distance_to_fixed(
     return distance - obstacles[o, 4], nx, ny
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def ahead_of_mouth(x: float, y: float, walls: Array, f: int) -> float:
     """Return the distance ahead of the open goal line beside wall ``f``, m.
 
@@ -99,7 +99,7 @@ def ahead_of_mouth(x: float, y: float, walls: Array, f: int) -> float:
     return float(nx * x + ny * y + walls[f, OFFSET])
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def stays_in_reach(
     x: float,
     y: float,

@@ -34,7 +34,7 @@ from marl_airhockey.backends.numba.bodies import (
 )
 from marl_airhockey.backends.numba.impulses import hardest, impact, strike
 from marl_airhockey.backends.numba.pushes import ALL, PADDLES, push
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 TIMES = 4
@@ -51,7 +51,7 @@ MULTIPLE = 3.0
 """A contact leaves no puck faster than the fastest body before, times this."""
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def solve(
     m: Array,
     role: Array,
@@ -125,7 +125,7 @@ def solve(
     return jam or (paddle and not calm)
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _bounce(
     m: Array,
     role: Array,
@@ -151,7 +151,7 @@ def _bounce(
     return False
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
     """Let nothing close in the coming drift; return True if that was found.
 
@@ -184,7 +184,7 @@ def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
     return False
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _stop_paddles_at_paddles(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int
 ) -> None:
@@ -201,7 +201,7 @@ def _stop_paddles_at_paddles(
         strike(m, at, i, j, contact, shares(m, role, i, j, False))
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def _stop_paddles(
     m: Array,
     role: Array,

@@ -17,11 +17,11 @@ from marl_airhockey.backends.numba.bodies import (
     shares,
 )
 from marl_airhockey.core.laws import impulse
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def strike(
     m: Array,
     at: int,
@@ -63,7 +63,7 @@ def strike(
         m[i, at + 1] -= wi * y
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def scatter(
     m: Array, at: int, i: int, j: int, nx: float, ny: float, kick: float
 ) -> None:
@@ -76,7 +76,7 @@ def scatter(
         m[j, SPIN] += kick * speed / m[j, RADIUS]
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def impact(
     m: Array,
     role: Array,
@@ -95,7 +95,7 @@ def impact(
         scatter(m, at, i, j, nx, ny, contacts[c, KICK])
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def hardest(
     m: Array,
     role: Array,

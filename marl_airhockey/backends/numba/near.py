@@ -27,14 +27,14 @@ from marl_airhockey.backends.numba.bodies import (
     partner,
 )
 from marl_airhockey.backends.numba.geometry import RELEASE
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 BOW = 3e-4
 """Distance of a curved way from its chord that a drift may have (m)."""
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def list_near(
     m: Array,
     role: Array,
@@ -107,7 +107,7 @@ def list_near(
     return count
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def list_near_drift(
     m: Array,
     role: Array,
@@ -132,7 +132,7 @@ def list_near_drift(
     return count
 
 
-@compiled(nogil=True, error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def longest_drift(m: Array, role: Array, near: Array, count: int) -> float:
     """Return the longest drift whose chords are true to `BOW`, s."""
     bend = 0.0

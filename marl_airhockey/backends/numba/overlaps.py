@@ -16,11 +16,11 @@ from marl_airhockey.backends.numba.bodies import (
     slop,
 )
 from marl_airhockey.backends.numba.geometry import distance_to_fixed
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def take_apart(
     m: Array, role: Array, walls: Array, obstacles: Array, held: int, edges: int
 ) -> None:
@@ -64,7 +64,7 @@ def take_apart(
             return
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def keep_in_reach(m: Array, walls: Array, paddles: int, edges: int) -> None:
     """Move paddles that could get out of their reaches back to the edge."""
     for j in range(paddles):

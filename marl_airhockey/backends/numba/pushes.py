@@ -19,7 +19,7 @@ from marl_airhockey.backends.numba.bodies import (
     closing,
 )
 from marl_airhockey.backends.numba.complementarity import complement
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 PADDLES, ALL = range(2)
@@ -29,7 +29,7 @@ CLOSES = 1e-6
 """Closing speed at which what was found is no solution (m/s)."""
 
 
-@compiled(nogil=True, error_model="numpy")
+@inner(error_model="numpy")
 def push(
     m: Array, role: Array, at: int, pairs: Array, contacts: Array, n: int, who: int
 ) -> bool:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
 
 
-@compiled()
+@inner()
 def factor(a: Array) -> None:
     """Compute Cholesky's lower factor of a symmetric positive matrix, in place."""
     n = len(a)
@@ -22,7 +22,7 @@ def factor(a: Array) -> None:
             a[i, j] /= a[j, j]
 
 
-@compiled()
+@inner()
 def solve(lower: Array, b: Array) -> None:
     """Solve a linear system with a Cholesky factor, in place."""
     n = len(b)

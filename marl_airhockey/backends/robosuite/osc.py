@@ -13,7 +13,7 @@ import numpy as np
 
 from marl_airhockey.backends.robosuite.cholesky import factor, solve
 from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 
@@ -97,7 +97,7 @@ def torques(
     return _fit(jacobian, bias, contact, motion, low, high, out)
 
 
-@compiled()
+@inner()
 def _velocity(twist: Array, table: Array) -> Array:
     """Return the velocity (3,) of the foot in the table frame, m/s."""
     velocity = np.zeros(3)
@@ -107,7 +107,7 @@ def _velocity(twist: Array, table: Array) -> Array:
     return velocity
 
 
-@compiled()
+@inner()
 def _plane_acceleration(
     twist: Array,
     position: Array,
@@ -130,7 +130,7 @@ def _plane_acceleration(
         out[i] = table[i, 0] * ax + table[i, 1] * ay
 
 
-@compiled()
+@inner()
 def _contact_acceleration(
     twist: Array,
     drift: Array,
@@ -160,7 +160,7 @@ def _contact_acceleration(
         out[3 + i] = gains[4] * off - damp * twist[3 + i] - drift[3 + i]
 
 
-@compiled()
+@inner()
 def _to_forces(jacobian: Array, mass: Array, first: Array, second: Array) -> None:
     """Multiply two accelerations (6,) by the inertia at the foot, in place.
 
@@ -182,7 +182,7 @@ def _to_forces(jacobian: Array, mass: Array, first: Array, second: Array) -> Non
     solve(mobility, second)
 
 
-@compiled()
+@inner()
 def _fit(
     jacobian: Array,
     bias: Array,

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from marl_airhockey.core.laws import cap, impulse, wall_restitution
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 MASS, GRIP, PULL_X, PULL_Y, DRAG, DAMPING = range(6)
@@ -105,7 +105,7 @@ def apply_laws(
     _set_restitutions(sliding, places, speeds)
 
 
-@compiled()
+@inner()
 def _rub(
     sliding: Sliding, i: int, paddles: Array, places: Array, speeds: Array
 ) -> None:
@@ -151,14 +151,14 @@ def _rub(
         speeds[d + 2] -= spins * rub / sliding.radius[1 + other]
 
 
-@compiled()
+@inner()
 def _pushes(dx: float, dy: float, nx: float, ny: float, touch: float) -> bool:
     """Return True if a body may push along a normal; (dx, dy) leads from it, m."""
     distance = np.hypot(dx, dy)
     return bool(0.0 < distance < touch + NEAR and nx * dx + ny * dy > SAME * distance)
 
 
-@compiled()
+@inner()
 def _set_restitutions(sliding: Sliding, places: Array, speeds: Array) -> None:
     """Set the restitutions of rails for the pucks that are nearest to them."""
     if sliding.laws[SLOPE] == 0.0:

@@ -16,7 +16,7 @@ from marl_airhockey.backends.robosuite.mujoco_c import (
 from marl_airhockey.backends.robosuite.osc import subtract_payload, torques
 from marl_airhockey.backends.robosuite.reference import reference_motion
 from marl_airhockey.backends.robosuite.sliding import apply_laws
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 RELEASE = 0.001
@@ -79,7 +79,7 @@ def refresh(sim: Any, static: Any, output: Any) -> None:
     _detect_events(sim, static, output, 0.0)
 
 
-@compiled()
+@inner()
 def _command_arm(
     sim: Any,
     static: Any,
@@ -137,7 +137,7 @@ def _command_arm(
     return share
 
 
-@compiled()
+@inner()
 def _to_table(static: Any, point: Array) -> Array:
     """Transform a point (3,) from the world to the table frame, m."""
     found = np.zeros(3)
@@ -147,7 +147,7 @@ def _to_table(static: Any, point: Array) -> Array:
     return found
 
 
-@compiled()
+@inner()
 def _measure(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> None:
     """Fill the positions and velocities of the paddles, and row k of the trace."""
     for s in range(len(sim.arms)):
@@ -175,7 +175,7 @@ def _measure(sim: Any, static: Any, output: Any, k: int, jacobian: Array) -> Non
         row[5] = np.hypot(output.paddles[s, 2], output.paddles[s, 3])
 
 
-@compiled()
+@inner()
 def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
     """Detect contacts that begin and goal lines that are crossed, ``elapsed`` s in."""
     near = static.radius[0] + static.radius[1]
@@ -215,7 +215,7 @@ def _detect_events(sim: Any, static: Any, output: Any, elapsed: float) -> None:
             output.beyond[p, m] = past
 
 
-@compiled()
+@inner()
 def _record(sim: Any, output: Any, k: int) -> None:
     """Fill row k of the path."""
     seats = len(sim.arms)
