@@ -23,6 +23,8 @@ class Allround(tactics.Scripted):
     """Time to a strike from which it waits instead (s)."""
     brave: float = 1.6
     """Speed of an approaching puck from which it guards (m/s)."""
+    shot: float = 1.0
+    """Share of its largest speed at which it strikes; below 1 its shots are soft."""
 
     def act(
         self, view: View, memory: dict[str, Array]
@@ -32,7 +34,7 @@ class Allround(tactics.Scripted):
             return np.zeros_like(own), memory
         field = tactics.Field.of(view.scene, view.seat)
         aim = tactics.open_goal(view, field)
-        strike, due = tactics.attack(view, field, aim, pace, lag)
+        strike, due = tactics.attack(view, field, aim, pace, lag, self.shot)
         place, motion = tactics.nearest_puck(view, field, lag)
         fast = motion[:, 0] < -self.brave
         can = due < self.patience

@@ -229,7 +229,7 @@ def _find_strike(
 
 
 def attack(
-    view: View, field: Field, aim: Array, pace: float, lag: float
+    view: View, field: Field, aim: Array, pace: float, lag: float, shot: float = 1.0
 ) -> tuple[Array, Array]:
     """Compute velocities that strike the puck at a point.
 
@@ -242,6 +242,7 @@ def attack(
         aim: (W, 2) m.
         pace: largest share of top speed.
         lag: Time by which pucks are predicted too late, s.
+        shot: share of that speed at which it strikes.
 
     Returns:
         Velocities (W, 2), m/s, and times to the strike (W,), s, infinite where the puck
@@ -263,7 +264,7 @@ def attack(
     rest = length(motion) < 0.3
     ready = (along > -0.01) & (along < 0.2) & (length(aside) < 0.02)
     strike = np.where(rest, ready, (due < 0.11) & (length(aside) < 0.06))
-    through = way * speed[:, None] + aside * 12.0
+    through = way * (shot * speed)[:, None] + aside * 12.0
     # Around the puck, not through it, when it is nearer to home than the paddle.
     wrong = (own[:, 0] > there[:, 0] - 0.3 * touch) & (due < 0.25)
     room = np.where(own[:, 1] >= there[:, 1], 1.0, -1.0) * touch * 1.25

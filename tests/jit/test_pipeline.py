@@ -2,6 +2,7 @@
 
 import numpy as np
 
+import marl_airhockey as ah
 from marl_airhockey.jit.codegen import load
 from marl_airhockey.jit.pipeline import Fixed, Pipeline, Stage
 
@@ -23,3 +24,18 @@ def test_a_pipeline_calls_its_stages_until_one_stops_it():
     assert pipeline()
     assert not pipeline()
     np.testing.assert_array_equal(x, 3.5)
+
+
+def test_scenes_of_all_sizes_share_one_compiled_kernel_of_the_physics(monkeypatch):
+    sources = set()
+
+    def note(source, *rest):
+        if "numba.kernel.advance" in source:
+            sources.add(source)
+        return load(source, *rest)
+
+    monkeypatch.setattr("marl_airhockey.jit.pipeline.load", note)
+    for options in ({}, {"pucks": 3}):
+        ah.make_world("duel", 2, options=options).reset(0)
+    ah.make_world("free_for_all", 2, options={"sides": 5}).reset(0)
+    assert len(sources) == 1

@@ -92,6 +92,12 @@ def test_it_plays_without_a_deep_learning_library():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+def test_soft_shots_do_not_beat_the_one_of_doubles():
+    driver, rivals = make_agent("zoo/doubles"), [make_agent("allround:shot=0.3")]
+    score, _ = play_against("doubles", driver, rivals, 40, 7, {})
+    assert score[0] >= 0.8
+
+
 def test_an_unknown_policy_is_named():
     with pytest.raises(ValueError, match=r"unknown policy of the zoo 'zoo/dule'"):
         ah.make_agent("zoo/dule")
