@@ -165,7 +165,7 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
     return _loaded[digest]
 
 
-FEW_FUNCTIONS = 40
+FEW_FUNCTIONS = 15
 """Number of functions in the cache below which most of a scenario is not there yet"""
 
 

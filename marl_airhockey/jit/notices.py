@@ -13,7 +13,7 @@ PAUSE = 2.0
 """Time after a compilation from which the next one of its name is announced again, s"""
 EVERY = 10.0
 """Time between two notices, s"""
-FIRST, LATER = 60, 8
+FIRST, LATER = 50, 4
 """Usual time to compile a scenario with an empty cache, and after another one, s"""
 
 
