@@ -137,12 +137,12 @@ class _Inputs:
     def __init__(self) -> None:
         self.values: list[int] = []
         self.strides: list[int] = []
-        """By how much each grows from one world to the next"""
+        """Growth of each from one world to the next"""
         self._arrays: list[Array] = []
-        """Arrays whose addresses these are"""
+        """Arrays, stored because the addresses are theirs"""
 
     def array(self, array: Array, shared: bool) -> str:
-        """Return the expression of an array, one of whose rows is of each world."""
+        """Return the expression of an array, whose rows are worlds if not shared."""
         assert array.flags.c_contiguous, "rows must lie one behind the other"
         self._arrays.append(array)
         address = self.number(array.ctypes.data, 0 if shared else array.strides[0])

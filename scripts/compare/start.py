@@ -2,8 +2,8 @@
 
     python scripts/compare/start.py CHECKOUT
 
-A case is a scenario, its options and a number of processes, each with one world. They
-begin together with an empty cache of compiled code and take a step; printed are the
+The processes of a case begin together with an empty cache of compiled code, or with one
+that another scenario has filled, and take a step of one world; printed are the
 CPU-seconds of all of them and the memory of the largest, the trees one after the other.
 """
 
@@ -15,19 +15,31 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
-CASES: dict[str, tuple[str, dict[str, Any], int]] = {
-    "juggle": ("juggle", {}, 1),
-    "duel": ("duel", {}, 1),
-    "duel, 3 pucks": ("duel", {"pucks": 3}, 1),
-    "duel, 8 pucks": ("duel", {"pucks": 8}, 1),
-    "free_for_all, 8 sides": ("free_for_all", {"sides": 8}, 1),
-    "juggle in 6 processes": ("juggle", {}, 6),
+
+class Case(NamedTuple):
+    """Scenario, with its options, and the processes that start it."""
+
+    scenario: str
+    options: dict[str, Any]
+    processes: int = 1
+    after: str = ""
+    """Scenario that has filled the cache"""
+
+
+CASES = {
+    "juggle": Case("juggle", {}),
+    "duel": Case("duel", {}),
+    "duel, 3 pucks": Case("duel", {"pucks": 3}),
+    "duel, 8 pucks": Case("duel", {"pucks": 8}),
+    "free_for_all, 8 sides": Case("free_for_all", {"sides": 8}),
+    "juggle in 6 processes": Case("juggle", {}, processes=6),
+    "duel after juggle": Case("duel", {}, after="juggle"),
 }
 START = """
 import json, sys
@@ -42,18 +54,23 @@ world.step(np.zeros((1, len(world.open), 2)))
 
 def start(tree: Path, case: str) -> tuple[float, float]:
     """Start a case; return CPU-seconds and GB of memory."""
-    scenario, options, processes = CASES[case]
+    if case not in CASES:
+        raise typer.BadParameter(f"no case {case!r}; there are {'; '.join(CASES)}")
+    scenario, options, processes, after = CASES[case]
     with tempfile.TemporaryDirectory() as folder:
         where = {"PYTHONPATH": str(tree), "MARL_AIRHOCKEY_CACHE": folder}
-        children = [
-            subprocess.Popen(
-                [sys.executable, "-c", START, scenario, json.dumps(options)],
+
+        def begin(name: str, options: dict[str, Any]) -> subprocess.Popen[bytes]:
+            return subprocess.Popen(
+                [sys.executable, "-c", START, name, json.dumps(options)],
                 env={**os.environ, **where},
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
             )
-            for _ in range(processes)
-        ]
+
+        if after:
+            begin(after, {}).wait()
+        children = [begin(scenario, options) for _ in range(processes)]
         used = [os.wait4(child.pid, 0) for child in children]
     if any(status for _, status, _ in used):
         raise typer.BadParameter(f"{case} does not start in {tree}")

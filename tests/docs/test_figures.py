@@ -163,6 +163,13 @@ def test_what_the_paper_announces_is_that_of_its_rows(monkeypatch):
     assert shown == [dict(zip(header, line, strict=True)) for line in made]
 
 
+def test_the_cost_of_learning_is_that_of_all_rows():
+    names = ("offline.csv", "announced.csv", "hindsight.csv")
+    spent = sum(float(r["cpu_minutes"]) for name in names for r in rows_of(name))
+    text = (ROOT / "docs/offline.md").read_text()
+    assert f" {spent / 60:.1f} CPU-hours of learning in all" in text
+
+
 def test_hindsight_is_that_of_its_rows():
     rows = {(row["task"], row["variant"]): row for row in rows_of("hindsight.csv")}
     shown = table("docs/training.md", "terminations", "success")

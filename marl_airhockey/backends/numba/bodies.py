@@ -5,8 +5,6 @@ They are rows of one array, as numba counts references to every array of a world
 
 from __future__ import annotations
 
-import numpy as np
-
 from marl_airhockey.backends.numba.geometry import distance_to_fixed, distance_to_point
 from marl_airhockey.jit.cache import inner
 from marl_airhockey.types import Array
@@ -38,15 +36,6 @@ TINY = 1e-9
 
 SLOP = 2e-4
 """Overlap that is left alone (m)."""
-
-
-@inner(error_model="numpy", forceinline=True)
-def hide_constant(value: int) -> int:
-    """Return an integer that numba does not take for a constant.
-
-    It would compile a function apart for each constant that it is called with.
-    """
-    return int(np.int64(value))
 
 
 @inner(error_model="numpy", forceinline=True)

@@ -56,7 +56,6 @@ from marl_airhockey.backends.numba.bodies import (
     Y,
     closing,
     distance_between,
-    hide_constant,
     slop,
 )
 from marl_airhockey.backends.numba.drift import drift
@@ -291,7 +290,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             if stale:
                 count = list_near(*world, left, near)
                 bend, stale = longest_drift(m, role, near, count), False
-            n, hits, deep, safe = hide_constant(0), False, False, np.inf
+            n, hits, deep, safe = 0, False, False, np.inf
             for k in range(count):
                 i, j = near[k, 0], near[k, 1]
                 gap, nx, ny = distance_between(m, i, j, walls, obstacles)
@@ -317,7 +316,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
                 continue
             if hits and not solved:
                 some = pairs, contacts, visits, kept, n
-                jam = solve(m, role, hide_constant(VX), *some, jam)
+                jam = solve(m, role, VX, *some, jam)
                 keep_below_the_cap()
                 collisions[b] += 1
                 stale = solved = True

@@ -41,7 +41,6 @@ from marl_airhockey.backends.numba.bodies import (
     Y,
     closing,
     distance_between,
-    hide_constant,
 )
 from marl_airhockey.backends.numba.geometry import (
     ahead_of_mouth,
@@ -117,7 +116,7 @@ def drift(
     """
     stale, most, last, tried = False, h, 0.0, h
     if jam:
-        slide = WIDE * _longest_slide(m, hide_constant(VX), pairs, contacts, n)
+        slide = WIDE * _longest_slide(m, VX, pairs, contacts, n)
         h = most = min(h, slide)
     for attempt in range(REFINEMENTS):
         _move_freely(m, role, row, left, h)
@@ -130,9 +129,9 @@ def drift(
             for c in range(n):
                 contacts[c, RESTITUTION] = contacts[c, FRICTION] = 0.0
             work = pairs, contacts, visits, kept, n
-            jam = solve(m, role, hide_constant(DX), *work, jam)
+            jam = solve(m, role, DX, *work, jam)
             stale, safe = True, 0.0
-            longest = _longest_slide(m, hide_constant(DX), pairs, contacts, n)
+            longest = _longest_slide(m, DX, pairs, contacts, n)
             longest *= 2.0 * WIDE if jam else 1.0
             if longest < h and attempt < REFINEMENTS - 1:
                 h = most = longest

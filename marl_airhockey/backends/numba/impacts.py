@@ -29,7 +29,6 @@ from marl_airhockey.backends.numba.bodies import (
     VX,
     VY,
     closing,
-    hide_constant,
     shares,
 )
 from marl_airhockey.backends.numba.impulses import hardest, impact, strike
@@ -117,7 +116,7 @@ def solve(
         for i in range(len(m) if paddle and not (jam and slow) else 0):
             if role[i] > PRESCRIBED:
                 m[i, at], m[i, at + 1], m[i, SPIN] = kept[i, 0], kept[i, 1], kept[i, 2]
-        if not push(m, role, at, pairs, contacts, n, hide_constant(ALL)):
+        if not push(m, role, at, pairs, contacts, n, ALL):
             _stop_paddles(m, role, at, pairs, contacts, visits, n)
     for i in range(len(m) if paddle else 0):
         if role[i] == ASKS and (m[i, at] != kept[i, 0] or m[i, at + 1] != kept[i, 1]):
@@ -142,7 +141,7 @@ def _bounce(
     Return True if none closes faster than ``least`` m/s then.
     """
     for _ in range(most):
-        c = hardest(m, role, at, pairs, contacts, n, hide_constant(1), least)
+        c = hardest(m, role, at, pairs, contacts, n, 1, least)
         if c < 0:
             return True
         restitution = contacts[c, RESTITUTION] if visits[c] < TIMES else 0.0
@@ -190,10 +189,9 @@ def _stop_paddles_at_paddles(
 ) -> None:
     """Let paddles that meet share their normal velocity."""
     for count in range(STOPS * n):
-        c = hardest(m, role, at, pairs, contacts, n, hide_constant(0), TINY)
+        c = hardest(m, role, at, pairs, contacts, n, 0, TINY)
         if c < 0 or (
-            count == DIRECT * n
-            and push(m, role, at, pairs, contacts, n, hide_constant(PADDLES))
+            count == DIRECT * n and push(m, role, at, pairs, contacts, n, PADDLES)
         ):
             return
         i, j = pairs[c, 0], pairs[c, 1]
@@ -215,7 +213,7 @@ def _stop_paddles(
     for c in range(n):
         visits[c] = 0
     for count in range(2 * STOPS * n):
-        c = hardest(m, role, at, pairs, contacts, n, hide_constant(2), TINY)
+        c = hardest(m, role, at, pairs, contacts, n, 2, TINY)
         if c < 0:
             return
         i, j = pairs[c, 0], pairs[c, 1]
