@@ -9,9 +9,11 @@ import numpy as np
 from marl_airhockey.core.table import Table
 from marl_airhockey.types import Array
 
+Meaning = Literal["goal", "reward", "cost", "drag"]
+
 
 class Mark(NamedTuple):
-    """Mark on the table: a goal, a line, an arrow."""
+    """Mark on the table: a goal, a region, a line, an arrow."""
 
     kind: Literal["circle", "line", "arrow"]
     start: tuple[float, float]
@@ -20,11 +22,14 @@ class Mark(NamedTuple):
     """Second end, m."""
     radius: float = 0.0
     """m"""
+    means: Meaning = "goal"
+    """What a circle is: a goal, or a region with a reward, a cost or a drag"""
 
     @staticmethod
-    def circle(centre: Array, radius: float) -> Mark:
+    def circle(centre: Array, radius: float, means: Meaning = "goal") -> Mark:
         """Return a circle, m."""
-        return Mark("circle", (float(centre[0]), float(centre[1])), radius=radius)
+        start = float(centre[0]), float(centre[1])
+        return Mark("circle", start, radius=radius, means=means)
 
     @staticmethod
     def across(table: Table, x: float) -> Mark:

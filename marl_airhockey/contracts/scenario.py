@@ -14,7 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.mark import Mark, Meaning
 from marl_airhockey.contracts.observable import Observable
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
@@ -287,8 +287,11 @@ class Scenario(ABC):
 
     def all_marks(self, state: State, memory: Memory) -> list[Mark]:
         """Return what to draw for one world: `marks`, and the regions."""
-        regions = (*self.reward_regions, *self.drag_regions)
-        circles = [Mark.circle(np.array(r[:2]), r[2]) for r in regions]
+        paid = self.reward_regions
+        means: list[Meaning] = ["reward" if r[3] > 0.0 else "cost" for r in paid]
+        means += ["drag"] * len(self.drag_regions)
+        regions = zip((*paid, *self.drag_regions), means, strict=True)
+        circles = [Mark.circle(np.array(r[:2]), r[2], kind) for r, kind in regions]
         return [*circles, *self.marks(state, memory)]
 
     def is_terminated(self, t: Transition) -> Array:

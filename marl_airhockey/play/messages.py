@@ -23,7 +23,8 @@ def drawn(
 ) -> dict[str, Any]:
     """Return all that a page draws of a world.
 
-    ``pucks`` are rows x, y, vx, vy; ``marks`` are rows kind, ax, ay, bx, by, radius.
+    ``pucks`` are rows x, y, vx, vy; ``marks`` are rows kind, ax, ay, bx, by, radius,
+    meaning (see `Mark`).
 
     Args:
         scenario: what is played.
@@ -41,7 +42,7 @@ def drawn(
         "blocks": rounded(state.position[state.bodies.block]),
         "angles": rounded(state.angle[state.bodies.block]),
         "marks": [
-            [m.kind, *rounded(np.array([*m.start, *m.end, m.radius]))]
+            [m.kind, *rounded(np.array([*m.start, *m.end, m.radius])), m.means]
             for m in scenario.all_marks(state, memory)
         ],
         "caption": scenario.caption(memory),

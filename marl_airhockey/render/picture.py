@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.mark import Mark, Meaning
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
 from marl_airhockey.render.canvas import SMOOTH, Canvas, Colour
@@ -36,6 +36,18 @@ PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
     (150, 112, 50),
 )
 GOAL = (200, 60, 90)
+CIRCLES: dict[Meaning, Colour] = {
+    "goal": GOAL,
+    "reward": (170, 125, 10),
+    "cost": (213, 94, 0),
+    "drag": (105, 116, 134),
+}
+SIGNS: dict[Meaning, list[tuple[float, float, float, float]]] = {
+    "reward": [(-1, 0, 1, 0), (0, -1, 0, 1)],
+    "cost": [(-1, 0, 1, 0)],
+    "drag": [(-1, -0.5, 1, -0.5), (-1, 0.5, 1, 0.5)],
+}
+"""Lines of a sign in the middle of a region, in quarters of its radius"""
 WIDTH = 880
 """Width of a picture unless another is given, pixels"""
 
@@ -71,7 +83,8 @@ def draw(frame: Frame, width: int = WIDTH) -> Array:
     _bodies(canvas, frame.scene, frame.state)
     for mark in frame.marks:
         # A goal that a paddle can hide is drawn over it.
-        if mark.kind == "circle" and mark.radius < frame.scene.table.paddle_radius:
+        goal = mark.kind == "circle" and mark.means == "goal"
+        if goal and mark.radius < frame.scene.table.paddle_radius:
             canvas.ring(mark.start, mark.radius, GOAL, 2)
     _bar(canvas, frame)
     return canvas.finish()
@@ -109,8 +122,12 @@ def _table(canvas: Canvas, frame: Frame) -> None:
 
 def _mark(canvas: Canvas, mark: Mark) -> None:
     if mark.kind == "circle":
-        canvas.disc(mark.start, mark.radius, _pale(GOAL, 0.82))
-        canvas.ring(mark.start, mark.radius, GOAL, 2)
+        colour, (x, y), unit = CIRCLES[mark.means], mark.start, 0.25 * mark.radius
+        canvas.disc(mark.start, mark.radius, _pale(colour, 0.82))
+        canvas.ring(mark.start, mark.radius, colour, 2)
+        for ax, ay, bx, by in SIGNS.get(mark.means, []):
+            ends = (x + unit * ax, y + unit * ay), (x + unit * bx, y + unit * by)
+            canvas.line(*ends, _pale(colour, 0.4), 2)
         return
     canvas.line(mark.start, mark.end, GOAL if mark.kind == "arrow" else PRINT, 2)
     if mark.kind == "arrow":

@@ -346,6 +346,23 @@ def test_arms_differ_from_world_to_world():
         ah.make_world("juggle", backend="numba", physics={"arm_force": 30.0})
 
 
+def test_obstacles_are_seen():
+    posts = [[0.2, 0.1, 0.05], [0.1, 0.0, 0.02, 0.4, -0.2], [0.3, 0.2, 0.04, 0.3, 0.2]]
+    kinds = ("hit_goal", "rgb_array", "birdview")
+    plain = ah.parallel_env(*kinds, backend="robosuite")
+    env = ah.parallel_env(*kinds, backend="robosuite", options={"obstacles": posts})
+    try:
+        pictures = []
+        for each in (plain, env):
+            each.reset(seed=0)
+            pictures.append(each.render().astype(int))
+            each.close()
+    except RuntimeError as error:
+        pytest.skip(str(error))
+    # Nothing else differs: bodies and goals start where the posts leave room.
+    assert 3000 < (np.abs(pictures[0] - pictures[1]).max(-1) > 20).sum() < 12000
+
+
 def test_it_is_seen_from_three_viewpoints():
     env = ah.parallel_env("hit_goal", "rgb_array", "agentview", backend="robosuite")
     env.reset(seed=0)

@@ -4,7 +4,7 @@ import numpy as np
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.render.picture import SEAT_COLOURS, Frame, draw
+from marl_airhockey.render.picture import CIRCLES, SEAT_COLOURS, Frame, draw
 
 
 def test_a_picture_shows_the_paddle_where_it_is(scenario):
@@ -48,3 +48,15 @@ def test_a_square_block_is_drawn_rotated():
     straight = draw(Frame(env.world.scene, state))
     state.angle[2] = 0.6
     assert not np.array_equal(straight, draw(Frame(env.world.scene, state)))
+
+
+def test_regions_show_what_they_are():
+    options = {
+        "reward_regions": [[0.4, 0.2, 0.1, 1.0], [0.4, -0.2, 0.1, -1.0]],
+        "drag_regions": [[0.0, 0.0, 0.2, 2.0]],
+    }
+    env = ah.parallel_env("hit_goal", render_mode="rgb_array", options=options)
+    env.reset(seed=0)
+    colours = env.render().reshape(-1, 3).astype(int)
+    for means, colour in CIRCLES.items():
+        assert (np.abs(colours - colour).max(-1) < 12).sum() > 60, means

@@ -7,14 +7,21 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.mark import Mark, Meaning
 from marl_airhockey.core.table import Table
 from marl_airhockey.devices.vision.lens import View
 from marl_airhockey.types import Array
 
 CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 1)
-PUCK, PADDLE, MARK, RAIL = (255, 240, 0), (255, 140, 0), (0, 220, 120), (90, 140, 255)
+PUCK, PADDLE, RAIL = (255, 240, 0), (255, 140, 0), (90, 140, 255)
 """Colours: red, green, blue"""
+MARKS: dict[Meaning, tuple[int, int, int]] = {
+    "goal": (0, 220, 120),
+    "reward": (255, 215, 60),
+    "cost": (255, 60, 60),
+    "drag": (170, 180, 200),
+}
+"""Colours of marks by what they mean"""
 AHEAD = 0.15
 """Time for which the velocity line extends the puck's motion, s"""
 
@@ -52,10 +59,11 @@ class Overlay:
         corners = np.asarray(table.vertices)
         self._line(drawn, np.vstack([corners, corners[:1]]), RAIL)
         for mark in marks:
+            colour = MARKS[mark.means]
             if mark.kind == "circle":
-                self._line(drawn, np.array(mark.start) + mark.radius * CIRCLE, MARK)
+                self._line(drawn, np.array(mark.start) + mark.radius * CIRCLE, colour)
             else:
-                self._line(drawn, np.array([mark.start, mark.end]), MARK)
+                self._line(drawn, np.array([mark.start, mark.end]), colour)
         self._line(drawn, paddle + table.paddle_radius * CIRCLE, PADDLE)
         if puck is not None:
             self._line(drawn, puck[:2] + table.puck_radius * CIRCLE, PUCK)

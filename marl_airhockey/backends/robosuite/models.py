@@ -189,16 +189,28 @@ class AirHockeyArena(Arena):
         end: tuple[float, float] | None,
         radius: float,
     ) -> None:
-        ends = {
-            "size": array_to_string([radius, TALL]),
-            "pos": f"{start[0]} {start[1]} {TALL}",
-        }
-        if end is not None:
-            points = [*start, TALL, *end, TALL]
-            ends = {"size": f"{radius}", "fromto": array_to_string(points)}
-        self._add(
-            f"obstacle{k}", "capsule", priority="3", **ends, **_sliding(SLIDES | RAIL)
-        )
+        name, seen = f"obstacle{k}", {"material": "rail", **_visual()}
+        ends = [start] if end is None or end == start else [start, end]
+        for i, point in enumerate(ends):
+            post = {
+                "size": array_to_string([radius, TALL]),
+                "pos": array_to_string([*point, TALL]),
+            }
+            self._add(f"{name}_{i}_visual", "cylinder", **post, **seen)
+        shape = post
+        if len(ends) == 2:
+            (ax, ay), (bx, by) = ends
+            points = [ax, ay, TALL, bx, by, TALL]
+            shape = {"size": f"{radius}", "fromto": array_to_string(points)}
+            # A little lower than its ends, so that these cover it.
+            long = np.hypot(bx - ax, by - ay)
+            bar = {
+                "size": array_to_string([long / 2, radius, 0.98 * TALL]),
+                "pos": array_to_string([(ax + bx) / 2, (ay + by) / 2, TALL]),
+                "xyaxes": array_to_string([bx - ax, by - ay, 0, ay - by, bx - ax, 0]),
+            }
+            self._add(f"{name}_visual", "box", **bar, **seen)
+        self._add(name, "capsule", priority="3", **shape, **_sliding(SLIDES | RAIL))
 
 
 def _visual() -> dict[str, str]:

@@ -11,11 +11,16 @@ import mujoco
 import numpy as np
 
 from marl_airhockey.backends.robosuite.frames import TableFrame
-from marl_airhockey.contracts.mark import Mark
+from marl_airhockey.contracts.mark import Mark, Meaning
 from marl_airhockey.types import Array
 
-GREEN = np.array([0.0, 0.62, 0.45, 0.55])
-"""Colour of marks (RGBA)."""
+COLOURS: dict[Meaning, tuple[float, float, float, float]] = {
+    "goal": (0.0, 0.62, 0.45, 0.55),
+    "reward": (0.9, 0.75, 0.1, 0.5),
+    "cost": (0.84, 0.37, 0.0, 0.5),
+    "drag": (0.41, 0.45, 0.53, 0.5),
+}
+"""Colours of marks by what they mean (RGBA)"""
 THIN = 0.004
 """Half the width of a line, and half the height of a circle (m)."""
 
@@ -69,10 +74,11 @@ class OffscreenRenderer:
             return
         geom = scene.geoms[scene.ngeom]
         start = self._frame.to_world(*mark.start, THIN)
+        colour = np.array(COLOURS[mark.means])
         if mark.kind == "circle":
             kind, size = mujoco.mjtGeom.mjGEOM_CYLINDER, [mark.radius, THIN, THIN]
             orientation = self._frame.rotation.ravel()
-            mujoco.mjv_initGeom(geom, kind, size, start, orientation, GREEN)
+            mujoco.mjv_initGeom(geom, kind, size, start, orientation, colour)
         else:
             kind = (
                 mujoco.mjtGeom.mjGEOM_ARROW
@@ -80,7 +86,7 @@ class OffscreenRenderer:
                 else mujoco.mjtGeom.mjGEOM_CAPSULE
             )
             mujoco.mjv_initGeom(
-                geom, kind, np.zeros(3), start, np.eye(3).ravel(), GREEN
+                geom, kind, np.zeros(3), start, np.eye(3).ravel(), colour
             )
             end = self._frame.to_world(*mark.end, THIN)
             mujoco.mjv_connector(geom, kind, 2 * THIN, start, end)

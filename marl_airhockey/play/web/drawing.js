@@ -46,7 +46,7 @@ function toTableFrame(a, b) {
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 let inks = {};
-function readInks() { for (const n of ["field", "rail", "print", "faint", "ink", "puck", "mark", "room"]) inks[n] = style("--" + n); }
+function readInks() { for (const n of ["field", "rail", "print", "faint", "ink", "puck", "mark", "reward", "cost", "drag", "room"]) inks[n] = style("--" + n); }
 readInks();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readInks);
 
@@ -94,16 +94,31 @@ function drawTable() {
     path([a, b, [b[0] - 0.04 * n[0], b[1] - 0.04 * n[1]], [a[0] - 0.04 * n[0], a[1] - 0.04 * n[1]]]);
     pen.fillStyle = colour(goalLine.owner); pen.fill();
   }
+}
+
+function drawObstacles() {
+  pen.lineCap = "round"; pen.strokeStyle = inks.rail;
   for (const [ax, ay, bx, by, r] of match.obstacles) {
-    path([[ax, ay], [bx, by]], false); pen.strokeStyle = inks.rail; pen.lineWidth = 2 * r * fit.scale; pen.lineCap = "round"; pen.stroke();
+    path([[ax, ay], [bx, by]], false); pen.lineWidth = 2 * r * fit.scale; pen.stroke();
   }
   pen.lineCap = "butt"; pen.lineWidth = Math.max(1, 0.004 * fit.scale);
 }
 
+// Lines of a sign in the middle of a region, in quarters of its radius.
+const SIGNS = { goal: [], reward: [[-1, 0, 1, 0], [0, -1, 0, 1]], cost: [[-1, 0, 1, 0]], drag: [[-1, -0.5, 1, -0.5], [-1, 0.5, 1, 0.5]] };
+
 function drawMarks() {
-  for (const [kind, ax, ay, bx, by, r] of now.marks) {
+  for (const [kind, ax, ay, bx, by, r, means] of now.marks) {
     pen.lineWidth = Math.max(1.5, 0.006 * fit.scale);
-    if (kind === "circle") { disc(ax, ay, r, alpha(inks.mark, 0.18), inks.mark); continue; }
+    if (kind === "circle") {
+      const ink = means === "goal" ? inks.mark : inks[means];
+      disc(ax, ay, r, alpha(ink, 0.18), ink);
+      const [x, y] = toScreen(ax, ay), unit = 0.25 * r * fit.scale;
+      pen.beginPath(); pen.strokeStyle = alpha(ink, 0.6);
+      for (const [a, b, c, d] of SIGNS[means]) { pen.moveTo(x + unit * a, y + unit * b); pen.lineTo(x + unit * c, y + unit * d); }
+      pen.stroke();
+      continue;
+    }
     pen.strokeStyle = pen.fillStyle = kind === "arrow" ? inks.mark : inks.print;
     path([[ax, ay], [bx, by]], false); pen.stroke();
     const size = Math.hypot(bx - ax, by - ay);

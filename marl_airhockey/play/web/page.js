@@ -12,7 +12,7 @@ function draw(at) {
     const late = linkRate() < 60 ? gap : LATE;
     const share = before ? Math.max(0, Math.min(1.2, (at - late - beforeAt) / gap)) : 1;
     pen.clearRect(0, 0, canvas.width, canvas.height);
-    drawTable(); drawMarks(); drawBodies(share);
+    drawTable(); drawMarks(); drawObstacles(); drawBodies(share);
     if (flash > 0) {
       pen.fillStyle = alpha(flashColour, 0.3 * flash); path(match.table); pen.fill(); flash = Math.max(0, flash - dt * 1.6);
     }
