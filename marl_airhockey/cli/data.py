@@ -167,14 +167,16 @@ def check(
 ) -> None:
     """Read all of recordings and name what is wrong; exit 1 if anything is."""
     from marl_airhockey.data.files import recordings_in
-    from marl_airhockey.data.reader import episodes_of
+    from marl_airhockey.data.reader import episodes_of, missing_steps
     from marl_airhockey.data.verify import EXACT, replay_differences
 
     count = 0
     wrong: list[str] = []
     for path in recordings_in(paths):
         try:
-            count += sum(1 for _ in episodes_of(path, bad=wrong))
+            cut = missing_steps(path)
+            count += sum(e.index not in cut for e in episodes_of(path, bad=wrong))
+            wrong += cut.values()
             found = replay_differences(path) if replay else {}
         except ValueError as error:
             wrong.append(str(error))

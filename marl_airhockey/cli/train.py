@@ -79,6 +79,8 @@ def train(
 ) -> None:
     """Train a policy with PPO and its preset, or by another --algo; or --resume."""
     from marl_airhockey.learn.algorithms import make_config
+    from marl_airhockey.learn.offline.choice import learned_from
+    from marl_airhockey.learn.offline.config import OfflineConfig
     from marl_airhockey.learn.ppo_config import PPOConfig
     from marl_airhockey.learn.train import default_folder
 
@@ -101,11 +103,14 @@ def train(
         "options": settings(option),
         "drivers": settings(other),
     }
-    changes = {name: value for name, value in shared.items() if value}
-    changes |= settings(change) | {"seed": seed, "backend": backend} | given
+    changes: dict[str, Any] = {name: v for name, v in shared.items() if v}
+    changes |= {"seed": seed, "backend": backend} | settings(change) | given
     config = make_config(algo, scenario, data or [], changes)
     if isinstance(config, PPOConfig) and steps is not None and not as_json:
         _tell_updates(steps, config, changes)
+    if isinstance(config, OfflineConfig) and not as_json:
+        for line in learned_from(config):
+            console.print(line, soft_wrap=True, markup=False)
     _train(config, out or default_folder(config), as_json)
 
 
@@ -135,11 +140,7 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
         for kind in ("learning", "evaluation", "setup")
     }
     if finished:
-        console.print(
-            f"{folder}: this run was finished already; to train on, begin another one "
-            f"with its weights: airhockey train SCENARIO --init {folder}",
-            soft_wrap=True,
-        )
+        console.print(_finished(folder), soft_wrap=True)
     parts = ", ".join(f"{kind} {value:.2f}" for kind, value in minutes.items())
     console.print(
         f"{folder}: {measure} {row[measure]:.3f} after {row['steps']:,.0f} steps "
@@ -147,6 +148,18 @@ def _train(config: AnyConfig | None, folder: Path, as_json: bool) -> None:
         soft_wrap=True,
     )
     console.print(f"next: airhockey {_next(folder)}", soft_wrap=True)
+
+
+def _finished(folder: Path) -> str:
+    """Return that a run was finished already, and how to train on."""
+    from marl_airhockey.learn.algorithms import load_any_config
+    from marl_airhockey.learn.ppo_config import PPOConfig
+
+    words = f"{folder}: this run was finished already; to train on, begin another one"
+    config = load_any_config(folder)
+    if not isinstance(config, PPOConfig):
+        return f"{words} with more --steps"
+    return f"{words} with its weights: airhockey train SCENARIO --init {folder}"
 
 
 def _next(folder: Path) -> str:

@@ -38,7 +38,7 @@ KINDS = "biuf"
 """Kinds of numbers that columns may have: bool, integers, floats"""
 FINITE = (
     *("state.position", "state.velocity", "state.angle", "state.spin", "state.time"),
-    *("action", "command", "reward"),
+    *("action", "command", "reward", "observation"),
 )
 """Columns in which no number may be missing"""
 Columns = dict[str, Array]

@@ -45,6 +45,7 @@ def head_of(world: World, keywords: Keywords) -> dict[str, Any]:
         "control_dt": world.control_dt,
         "max_cycles": world.max_cycles,
         "observe": world.observer.observe,
+        "observation_labels": list(world.observation_labels),
         **{name: keywords[name] for name in SHARED if name in keywords},  # type: ignore[literal-required]
         **_rig(keywords),
         "versions": {

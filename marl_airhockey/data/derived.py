@@ -20,7 +20,7 @@ from marl_airhockey.data.reader import (
 )
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 
-PASSING = ("began", "versions", "columns", "format")
+PASSING = ("began", "versions", "columns", "format", "observation_labels")
 """Keys of a head that may differ where a recording is resumed"""
 
 

@@ -34,6 +34,12 @@ def shown_name(path: Path) -> str:
     return str(path.relative_to(root) if path.is_relative_to(root) else path)
 
 
+def dataset_of(path: Path) -> str:
+    """Return the name of the dataset that a recording is a part of; "" for none."""
+    root = dataset_folder("")
+    return str(path.parent.relative_to(root)) if path.is_relative_to(root) else ""
+
+
 def is_recording(path: Path) -> bool:
     """Return whether a path is the folder of a recording."""
     return (path / META).is_file()

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.recording import (
     EPISODES,
     FINITE,
@@ -83,6 +84,27 @@ def read_episode_rows(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
+def missing_steps(path: Path) -> dict[int, str]:
+    """Return what lacks at the ends of episodes, in words by episode.
+
+    An episode whose recording was interrupted lacks nothing, and `episodes_of` names
+    one of which all is missing before another.
+
+    Raises:
+        ValueError: A part that cannot be read; names it.
+    """
+    rows = read_episode_rows(path)
+    counts = step_counts(path, len(rows))
+    last = int(np.flatnonzero(counts)[-1]) if counts.any() else -1
+    return {
+        k: f"{path}: episode {k}: {rows[k]['length'] - counts[k]} of its "
+        f"{rows[k]['length']} steps are missing at the end"
+        for k in range(len(rows))
+        if rows[k]["reason"] and counts[k] < rows[k]["length"]
+        if counts[k] or k > last
+    }
+
+
 def step_counts(path: Path, episodes: int) -> Array:
     """Return the number of steps that are there of each episode.
 
@@ -99,18 +121,19 @@ def step_counts(path: Path, episodes: int) -> Array:
     return last
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: str | Path) -> Recording:
     """Read a recording.
 
     Raises:
         ValueError: No recording, one of another version, or one that makes no sense;
             names it and what is wrong.
     """
+    path = Path(path)
     return Recording(path, read_head(path), list(episodes_of(path)))
 
 
 def episodes_of(
-    path: Path,
+    path: str | Path,
     names: Collection[str] | None = None,
     bad: list[str] | None = None,
 ) -> Iterator[RecordedEpisode]:
@@ -118,13 +141,16 @@ def episodes_of(
 
     Args:
         path: Folder of the recording.
-        names: Names of the columns that are read; None for all.
+        names: Names of the columns that are read, of which some may be missing; None
+            for all.
         bad: List to which is added what is wrong, so that good episodes are read on;
             None to raise instead.
 
     Raises:
-        ValueError: Something is wrong; names file or episode.
+        ValueError: Something is wrong, or no column of ``names`` is there; names file
+            or episode.
     """
+    path = Path(path)
     head, rows = read_head(path), read_episode_rows(path)
     layout = _layout(path, head, names)
     pieces: _Pieces | None = None
@@ -156,12 +182,16 @@ def _layout(
     """Return the columns that are read, by name.
 
     Raises:
-        ValueError: A description that makes no sense; names the recording.
+        ValueError: A description that makes no sense, or none of the names in it;
+            names the recording.
     """
+    known = head["columns"]
+    if names and known and not known.keys() & {*names}:
+        raise ValueError(f"{path}: {unknown_name('column', next(iter(names)), known)}")
     try:
         return {
             name: Column.from_fields(name, fields)
-            for name, fields in head["columns"].items()
+            for name, fields in known.items()
             if names is None or name in names
         }
     except ValueError as error:
@@ -248,7 +278,7 @@ def _joined(
             ~np.isfinite(whole[name]).reshape(pieces.next, -1).all(1)
         )
         # Before the first step there is no action.
-        lacks = lacks[lacks >= (not name.startswith("state."))]
+        lacks = lacks[lacks >= (not name.startswith(("state.", "observation")))]
         if name in FINITE and lacks.size:
             words = f"{where}: {name} is not finite at step {lacks[0]}"
             return _complain(words, bad)

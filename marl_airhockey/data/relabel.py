@@ -23,7 +23,7 @@ from marl_airhockey.data.replay import Replay
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.registry import make_scenario, scenario_names
 
-LEFT_OUT = ("columns", "format", *SHARED)
+LEFT_OUT = ("columns", "format", "observation_labels", *SHARED)
 """Keys of a head that are not those of the relabelled recording"""
 CUT = "the recording ends here"
 """Reason of the end of an episode that its new rules would not have ended yet"""

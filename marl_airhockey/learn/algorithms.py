@@ -23,6 +23,8 @@ PLAYING: dict[str, Callable[[str, Mapping[str, Any]], AnyConfig]] = {
     SAC_HER: hindsight_config,
 }
 """Makers of configurations of what learns by playing, by algorithm"""
+APART = ("scenario", "algo", "data")
+"""Fields of configurations that are no settings, as they are arguments"""
 KINDS: dict[str, type[AnyConfig]] = {
     PPO: PPOConfig,
     SAC_HER: HindsightConfig,
@@ -49,9 +51,14 @@ def make_config(
         ValueError: an unknown name, a bad setting, data that are missing or that
             nothing is learned from.
     """
+    for name in APART:
+        if name in settings:
+            raise ValueError(f"{name}: it is no setting of a run; name it apart")
     if algo in OFFLINE:
         if not data:
-            raise ValueError(f"algo {algo} learns from recordings; name them as data")
+            raise ValueError(
+                f"data: {algo} learns from recordings; name some with --data"
+            )
         named = {"scenario": scenario} if scenario else {}
         return offline_config(algo, data, {**settings, **named})
     if algo not in PLAYING:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import torch
@@ -134,3 +135,19 @@ def save_state(
         state["optimizer"] = optimizer.state_dict()
     torch.save(state, draft)
     draft.replace(folder / f"{name}.pt")
+
+
+def load_state(path: Path) -> dict[str, Any]:
+    """Read what `save_state` wrote; no code in it is run.
+
+    Raises:
+        ValueError: It is missing or damaged; names the file.
+    """
+    try:
+        found: dict[str, Any] = torch.load(path, weights_only=True)
+    except (OSError, EOFError, RuntimeError, UnpicklingError) as error:
+        raise ValueError(
+            f"{path}: missing or damaged ({error}); begin the run again in another "
+            "folder, or copy the file from a backup"
+        ) from error
+    return found

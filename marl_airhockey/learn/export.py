@@ -5,12 +5,13 @@ from __future__ import annotations
 import datetime
 import json
 import shlex
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.data.files import shown_name
+from marl_airhockey.data.files import dataset_of, recordings_in
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
@@ -88,7 +89,9 @@ def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> Numpy
 def _load_last(run: Path) -> NumpyPolicy:
     """Return the last policy of a run."""
     if not (run / "last.npz").exists():
-        raise ValueError(f"{run}: no .npz holds a policy on pixels")
+        raise ValueError(
+            f"{run}: its policy on pixels is a file already: {run / 'last.onnx'}"
+        )
     return NumpyPolicy.load(run / "last.npz")
 
 
@@ -127,7 +130,8 @@ def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
 def training_command(config: AnyConfig) -> str:
     """Return the command line that trains a configuration again.
 
-    Recordings are named by their folders, and data of a named dataset by its name.
+    Recordings are named from the working directory on, or by their folders alone if
+    they are elsewhere; all recordings of a named dataset by its name.
     """
     algo = PPO if isinstance(config, PPOConfig) else config.algo
     data = config.data if isinstance(config, OfflineConfig) else []
@@ -136,9 +140,7 @@ def training_command(config: AnyConfig) -> str:
     words = [f"airhockey train {config.scenario} --seed {config.seed}"]
     if algo != PPO:
         words.append(f"--algo {algo}")
-    folders = (shown_name(Path(path)) for path in data)
-    shown = [Path(name).name if Path(name).is_absolute() else name for name in folders]
-    words += [f"--data {name}" for name in shown]
+    words += [f"--data {shlex.quote(name)}" for name in _given(data)]
     if config.profile != "ideal":
         words.append(f"--profile {config.profile}")
     words += [f"--option {k}={v}" for k, v in config.options.items()]
@@ -152,3 +154,17 @@ def training_command(config: AnyConfig) -> str:
             setting = f"{f.name}={json.dumps(value, separators=(',', ':'))}"
             words.append("--set " + shlex.quote(setting))
     return " ".join(words)
+
+
+def _given(data: Sequence[str]) -> list[str]:
+    """Return the names by which recordings are given."""
+    found: list[str] = []
+    for path in map(Path, data):
+        name = dataset_of(path)
+        if name and {str(p) for p in recordings_in([Path(name)])} <= {*data}:
+            found.append(name)
+        elif path.is_relative_to(Path.cwd()):
+            found.append(str(path.relative_to(Path.cwd())))
+        else:
+            found.append(path.name)
+    return list(dict.fromkeys(found))

@@ -19,6 +19,7 @@ from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
     evaluate_and_record,
+    load_state,
     note_step,
     save_weights,
     training_threads,
@@ -283,7 +284,7 @@ class Trainer:
 
     def _load(self, path: Path, whole: bool) -> None:
         """Read weights, and for the same run the optimizer; no code in it is run."""
-        state = torch.load(path, weights_only=True)
+        state = load_state(path)
         try:
             self.model.load_state_dict(state["model"])
         except RuntimeError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar
@@ -50,15 +51,16 @@ class RunConfig:
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            number = isinstance(value, (int, float)) and not isinstance(value, bool)
-            if f.type in ("int", "float") and not number:
-                raise ValueError(f"{f.name}: expected a number, got {value!r}")
-            if f.type == "int" and int(value) != value:
-                raise ValueError(f"{f.name}: expected a whole number, got {value!r}")
-            if number and f.name not in self.MAY_BE_ZERO and value <= 0:
+            expected = _expected(str(f.type), value)
+            if expected:
+                raise ValueError(f"{f.name}: expected {expected}, got {value!r}")
+            positive = f.name not in self.MAY_BE_ZERO
+            if f.type in ("int", "float") and positive and value <= 0:
                 raise ValueError(f"{f.name}: {value} must be above 0")
         if not self.hidden or any(w < 1 for w in self.hidden):
             raise ValueError(f"hidden: {self.hidden} must be widths above 0")
+        if self.gamma > 1.0:
+            raise ValueError(f"gamma: {self.gamma} must be in 0 .. 1")
 
     @property
     def keywords(self) -> Keywords:
@@ -96,6 +98,22 @@ class RunConfig:
             else:
                 lines.append(f"{name} = {_toml(value)}")
         return "\n".join([*lines, *tables]) + "\n"
+
+
+def _expected(kind: str, value: Any) -> str:
+    """Return what a setting of a type must be; "" if its value is that."""
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    number = whole or (isinstance(value, float) and math.isfinite(value))
+    if kind == "float" or (kind == "int" and not number):
+        return "" if number else "a number"
+    if kind == "int":
+        return "" if whole else "a whole number"
+    if kind == "list[int]":
+        fits = isinstance(value, list) and all(not _expected("int", w) for w in value)
+        return "" if fits else "a list of whole numbers"
+    if kind.startswith("dict["):
+        return "" if isinstance(value, dict) else "values by name"
+    return ""
 
 
 def _toml(value: Any) -> str:

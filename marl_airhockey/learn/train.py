@@ -56,7 +56,7 @@ def train(
     folder: str | Path | None = None,
     *,
     algo: str = PPO,
-    data: Sequence[str | Path] = (),
+    data: str | Path | Sequence[str | Path] = (),
     report: ProgressCallback | None = None,
     **settings: Any,
 ) -> TrainingResult:
@@ -67,7 +67,8 @@ def train(
         folder: Folder of the run; None for ``runs/SCENARIO-SEED``.
         algo: "ppo"; "sac_her", for scenarios with goals; "bc" or "iql", which learn
             from recordings.
-        data: Files of recordings and folders of them, for those.
+        data: Recordings, folders of them and names of datasets, for those; one or
+            several.
         report: Function of steps done, steps in all and the latest evaluation.
         **settings: Changes of the preset, see `learn.ppo_config.PPOConfig`,
             `learn.hindsight.config.HindsightConfig` and
@@ -78,7 +79,8 @@ def train(
         ValueError: An unknown scenario or setting, or a folder that holds a run.
         RuntimeError: A missing extra, with the line that installs it.
     """
-    config = make_config(algo, scenario, data, settings)
+    given = [data] if isinstance(data, str | Path) else data
+    config = make_config(algo, scenario, given, settings)
     place = Path(folder) if folder else default_folder(config)
     row = run_training(config, place, report)
     return TrainingResult(place, int(row["steps"]), dict(row))

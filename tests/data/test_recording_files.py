@@ -16,8 +16,15 @@ from marl_airhockey.core.recording import FORMAT
 from marl_airhockey.data import writer
 from marl_airhockey.data.derived import repaired
 from marl_airhockey.data.parts import merge_parts, parts_of
-from marl_airhockey.data.reader import episodes_of, read_head, read_recording
+from marl_airhockey.data.reader import (
+    episodes_of,
+    missing_steps,
+    read_head,
+    read_recording,
+)
+from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.writer import PART, RecordingWriter
+from marl_airhockey.registry import make_agent
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
@@ -436,3 +443,19 @@ def test_a_missing_recording_is_named(tmp_path):
     with pytest.raises(ValueError, match="no: cannot be read as a recording"):
         read_recording(tmp_path / "no")
     assert read_head(write(tmp_path / "a"))["format"] == FORMAT
+
+
+def test_steps_that_lack_at_the_end_are_named(tmp_path):
+    path = record_episodes(
+        make_agent("still"), "still", "reach", 3, tmp_path / "a", 0, {}
+    )
+    (part,) = path.glob("steps/*.parquet")
+    table = pq.read_table(part)
+    assert missing_steps(path) == {}
+    last = table.num_rows - 40
+    pq.write_table(table.slice(0, last), part)
+    (words,) = missing_steps(path).values()
+    assert words == f"{path}: episode 2: 40 of its 60 steps are missing at the end"
+    assert read_recording(path).episodes[2].reason == ""
+    part.unlink()
+    assert list(missing_steps(path)) == [0, 1, 2]

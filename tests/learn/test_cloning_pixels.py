@@ -9,6 +9,7 @@ pytest.importorskip("onnx")
 import torch
 
 import marl_airhockey as ah
+from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.offline.pixels import PixelActor, render_pictures
@@ -30,7 +31,7 @@ def expert(tmp_path_factory):
 
 def test_pictures_of_a_recording_are_those_that_pixels_show(expert):
     scene = ah.make_scenario("hit_goal").scene
-    data = render_pictures([expert], scene, 0)
+    data = render_pictures([expert], scene, 0, 1.0)
     env = ah.gym_env("hit_goal", observe="pixels")
     row = 0
     for seed in (3, 4, 5):
@@ -42,6 +43,17 @@ def test_pictures_of_a_recording_are_those_that_pixels_show(expert):
             seen, _, terminated, truncated, _ = env.step(data.action[row].numpy())
             done, row = terminated or truncated, row + 1
     assert row == len(data.action)
+
+
+def test_a_share_of_the_pictures_is_of_the_best_episodes(expert):
+    scene = ah.make_scenario("hit_goal").scene
+    episodes = read_recording(expert).episodes
+    best = max(episodes, key=lambda e: e.columns["reward"].sum())
+    data = render_pictures([expert], scene, 0, 0.34)
+    np.testing.assert_array_equal(
+        data.action.numpy(),
+        best.columns["action"][:, 0].astype(np.float32).clip(-1, 1),
+    )
 
 
 def test_a_run_from_pixels_goes_on_and_leaves_an_onnx_policy(expert, tmp_path):

@@ -1,6 +1,8 @@
 """Learning from recordings: the dataset, each algorithm, its losses and its files."""
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 pytest.importorskip("torch")
@@ -11,7 +13,9 @@ from marl_airhockey.data.files import recordings_in
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.learn.algorithms import make_config
 from marl_airhockey.learn.export import export_policy
+from marl_airhockey.learn.offline.choice import learned_from
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.train import load_any_config, run_training
@@ -136,12 +140,69 @@ def test_a_run_that_was_cut_off_goes_on(expert, tmp_path):
         ({"scenario": "touch"}, "scenario: 'touch', but the recordings are of 'reach'"),
         ({"worlds": 3}, "worlds"),
         ({"seat": 4}, "there is no seat 4"),
+        ({"seat": "x"}, "there is no seat 'x'"),
+        ({"hidden": 256}, "hidden: expected a list of whole numbers, got 256"),
+        ({"hidden": [64.5]}, "hidden: expected a list of whole"),
+        ({"batch_size": 32.0}, "batch_size: expected a whole number, got 32.0"),
+        ({"temperature": float("nan")}, "temperature: expected a number, got nan"),
+        ({"gamma": 2.0}, "gamma: 2.0 must be"),
+        ({"drivers": 3}, "drivers: expected values by name, got 3"),
     ],
 )
 def test_bad_settings_are_named(expert, tmp_path, change, words):
     with pytest.raises(ValueError, match=words):
         run_training(offline_config("bc", [expert], SMALL | change), tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("name", ["scenario", "algo", "data"])
+def test_what_is_no_setting_is_not_taken_for_one(expert, name):
+    with pytest.raises(ValueError, match=f"{name}: it is no setting"):
+        make_config("bc", "reach", [expert], {name: "touch"})
+
+
+def test_observations_that_are_not_finite_are_named(tmp_path):
+    path = record(tmp_path, "random", "reach", 2)
+    part = next(path.glob("steps/*.parquet"))
+    table = pq.read_table(part)
+    rows = table["observation"].to_pylist()
+    rows[7][3] = float("nan")
+    k = table.schema.get_field_index("observation")
+    kind = table.schema.field("observation")
+    pq.write_table(table.set_column(k, kind, pa.array(rows, kind.type)), part)
+    with pytest.raises(ValueError, match="observation is not finite at step 7"):
+        run_training(offline_config("bc", [path], SMALL), tmp_path / "run")
+
+
+def test_it_is_said_what_is_learned_from(expert, tmp_path):
+    few = offline_config("bc", [record(tmp_path, "still", "reach", 4)], {"share": 0.5})
+    first, *odd = learned_from(few)
+    assert first == "learning from 2 of 4 episodes, 120 steps, success 0.000"
+    assert odd[0] == "none of these episodes succeeded"
+    assert "fewer steps than a batch has, 256" in odd[1]
+    (only,) = learned_from(offline_config("bc", [expert], {}))
+    assert only.endswith("success 1.000")
+    for player in ("goalkeeper", "random"):
+        against = {"drivers": {"paddle_1": player}, "max_cycles": 20}
+        record(tmp_path / "duel" / player, "striker", "duel", 1, **against)
+    *_, line = learned_from(offline_config("bc", [tmp_path / "duel"], {}))
+    assert line.startswith("paddle_1 is goalkeeper in evaluations")
+    assert "random" in line
+
+
+def test_a_damaged_checkpoint_is_named(expert, tmp_path):
+    config = offline_config("bc", [expert], SMALL)
+
+    def stop(done, total, row):
+        if row:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_training(config, tmp_path, stop)
+    weights = tmp_path / "last.pt"
+    weights.write_bytes(weights.read_bytes()[:5000])
+    with pytest.raises(ValueError, match=r"last\.pt: missing or damaged"):
+        run_training(None, tmp_path)
 
 
 def test_data_that_does_not_fit_is_named(expert, tmp_path):

@@ -21,6 +21,7 @@ from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
+    load_state,
     note_step,
     training_threads,
 )
@@ -65,7 +66,7 @@ def _train(
     config, progress = run.config, run.progress
     model = build_model(config, env)
     if progress.steps:
-        known = torch.load(run.folder / "last.pt", weights_only=True)
+        known = load_state(run.folder / "last.pt")
         model.set_parameters(known["model"], device="cpu")
         with torch.no_grad():
             _entropy(model).copy_(known["entropy"])

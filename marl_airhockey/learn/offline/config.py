@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.data.benchmark.build import built
-from marl_airhockey.data.files import recordings_in, shared_head
+from marl_airhockey.data.files import recordings_in, shared_head, shown_name
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
 
@@ -30,7 +30,9 @@ class OfflineConfig(RunConfig):
         ValueError: a value that makes no sense, named.
     """
 
-    MAY_BE_ZERO: ClassVar[tuple[str, ...]] = ("seed", "seat")
+    MAY_BE_ZERO: ClassVar[tuple[str, ...]] = (
+        *("seed", "seat", "alpha", "critic_penalty", "target_noise"),
+    )
 
     algo: str
     data: list[str]
@@ -111,11 +113,12 @@ def offline_config(
         shown = pixels and name == "observe"  # Rendered from the recorded states.
         if name in changes and changes[name] != head[name] and not shown:
             raise ValueError(
-                f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r}"
+                f"{name}: {changes[name]!r}, but the recordings are of {head[name]!r} "
+                f"({shown_name(files[0])}); name others, or leave it out"
             )
     seat, players = changes.get("seat", 0), head["players"]
-    if not 0 <= seat < len(players):
-        raise ValueError(f"seat: there is no seat {seat} in {files[0]}")
+    if seat not in range(len(players)):
+        raise ValueError(f"seat: there is no seat {seat!r} in {files[0]}")
     # Evaluated policies play paddle_0, so who played there takes the learned seat.
     drivers = {
         f"paddle_{i}": players[0 if i == seat else i]["driver"]

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from marl_airhockey.core.recording import RecordedEpisode
 from marl_airhockey.data.reader import episodes_of
+from marl_airhockey.learn.offline.choice import best_of
 from marl_airhockey.types import Array
 
 GOALS = tuple(
@@ -78,8 +79,8 @@ def load_dataset(
     ]
     if not episodes:
         raise ValueError(f"{files[0]}: there are no steps in it")
-    order = np.argsort([-parts["reward"].sum() for parts in episodes], kind="stable")
-    kept = [episodes[k] for k in order[: max(round(share * len(episodes)), 1)]]
+    returns = [float(parts["reward"].sum()) for parts in episodes]
+    kept = [episodes[k] for k in best_of(returns, share)]
     scale = float(np.concatenate([_to_go(p["reward"], gamma) for p in kept]).std())
     scale = scale if scale > 1e-6 else 1.0
 
@@ -122,6 +123,12 @@ def _seat_of(
         )
     if seat >= shown.shape[1]:
         raise ValueError(f"{where}: there is no seat {seat}")
+    odd = np.flatnonzero(~np.isfinite(shown[:, seat]).all(-1))
+    if len(odd):
+        raise ValueError(
+            f"{where}: its observation is not finite at step {odd[0]}; "
+            "airhockey data repair leaves such episodes out"
+        )
     action = columns["action"][:, seat]
     return {
         "observation": shown[:-1, seat],

@@ -12,6 +12,7 @@ import torch
 from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
+    load_state,
     save_weights,
     training_threads,
 )
@@ -69,7 +70,7 @@ class Learner:
         learned = [p for p in self.model.parameters() if p.requires_grad]
         self._optimizer = torch.optim.Adam(learned, config.learning_rate, fused=True)
         if run.progress.steps:
-            state = torch.load(run.folder / "last.pt", weights_only=True)
+            state = load_state(run.folder / "last.pt")
             self.model.load_state_dict(state["model"])
             self._optimizer.load_state_dict(state["optimizer"])
         self._log = RunLog(run.folder, run.progress.steps)
@@ -87,8 +88,10 @@ class Learner:
         while run.steps_left > 0:
             first = run.progress.steps
             last = min(first + REPORT, self._config.total_steps)
+            losses: dict[str, float] = {}
             for step in range(first, last):
-                losses = self.descend(step)
+                # An actor may learn at every second step alone.
+                losses |= self.descend(step)
             run.update_progress(last, self._config.learning_rate)
             for name, value in losses.items():
                 self._log.record(f"train/{name}", value)

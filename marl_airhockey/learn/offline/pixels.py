@@ -18,9 +18,10 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.observable import FRAMES
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.reader import episodes_of
-from marl_airhockey.learn.engine import save_state, training_threads
+from marl_airhockey.learn.engine import load_state, save_state, training_threads
 from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
 from marl_airhockey.learn.logs import RunLog
+from marl_airhockey.learn.offline.choice import best_of
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.onnx_export import Graph
 from marl_airhockey.learn.run import TrainingRun
@@ -53,8 +54,16 @@ class Pictures(NamedTuple):
         return pictures, self.action[rows]
 
 
-def render_pictures(files: Sequence[Path], scene: Scene, seat: int) -> Pictures:
+def render_pictures(
+    files: Sequence[Path], scene: Scene, seat: int, share: float
+) -> Pictures:
     """Render what a seat observed in recordings.
+
+    Args:
+        files: Recordings.
+        scene: Scene of the scenario.
+        seat: Seat.
+        share: Share of the episodes that are taken, those of the highest returns.
 
     Raises:
         ValueError: There are no steps.
@@ -62,9 +71,19 @@ def render_pictures(files: Sequence[Path], scene: Scene, seat: int) -> Pictures:
     rotation = scene.table.rotation(scene.seats[seat].side)
     frames: list[Array] = []
     shown, actions = [], []
+    played = [
+        (path, episode.index, float(episode.columns["reward"][:, seat].sum()))
+        for path in files
+        for episode in episodes_of(path, ("reward",))
+        if len(episode)
+    ]
+    if not played:
+        raise ValueError(f"{files[0]}: there are no steps in it")
+    best = best_of([value for *_, value in played], share)
+    taken = {played[k][:2] for k in best}
     for path in files:
         for episode in episodes_of(path, COLUMNS):
-            if not len(episode):
+            if (path, episode.index) not in taken:
                 continue
             before = {
                 name: np.concatenate([episode.first[name][None], episode.columns[name]])
@@ -80,8 +99,6 @@ def render_pictures(files: Sequence[Path], scene: Scene, seat: int) -> Pictures:
             past = np.arange(count)[:, None] + np.arange(1 - FRAMES, 1)
             shown.append(first + np.maximum(past, 0))
             actions.append(episode.columns["action"][:, seat])
-    if not frames:
-        raise ValueError(f"{files[0]}: there are no steps in it")
     return Pictures(
         torch.from_numpy(np.stack(frames)),
         torch.from_numpy(np.concatenate(shown)),
@@ -152,13 +169,13 @@ class PixelCloning:
         self._run = run
         scene = find_scenario(config.scenario, **config.options).scene
         files = [Path(path) for path in config.data]
-        self._data = render_pictures(files, scene, config.seat)
+        self._data = render_pictures(files, scene, config.seat, config.share)
         # A resumed run samples other steps than those of its beginning.
         torch.manual_seed(config.seed * 10_000 + run.progress.steps % 9973)
         self.model = PixelActor(config.hidden)
         self._optimizer = torch.optim.Adam(self.model.parameters(), fused=True)
         if run.progress.steps:
-            state = torch.load(run.folder / "last.pt", weights_only=True)
+            state = load_state(run.folder / "last.pt")
             self.model.load_state_dict(state["model"])
             self._optimizer.load_state_dict(state["optimizer"])
         self._log = RunLog(run.folder, run.progress.steps)

@@ -1,0 +1,61 @@
+"""Choice of episodes that are learned from, and what it comes to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from marl_airhockey.data.reader import read_episode_rows, read_head
+from marl_airhockey.learn.offline.config import OfflineConfig
+
+
+def best_of(returns: Sequence[float], share: float) -> list[int]:
+    """Return which of some episodes are learned from: a share, of the best returns."""
+    order = np.argsort([-value for value in returns], kind="stable")
+    return [int(k) for k in order[: max(round(share * len(returns)), 1)]]
+
+
+def learned_from(config: OfflineConfig) -> list[str]:
+    """Return what a run learns from, and what is odd about it, a line each.
+
+    Raises:
+        ValueError: A recording that makes no sense; named.
+    """
+    files, seat = [Path(path) for path in config.data], config.seat
+    rows = [row for path in files for row in read_episode_rows(path) if row["length"]]
+    best = best_of([_of(row, "returns", seat) or 0.0 for row in rows], config.share)
+    chosen = [rows[k] for k in best if rows]
+    steps = sum(row["length"] for row in chosen)
+    words = f"learning from {len(chosen)} of {len(rows)} episodes, {steps:,} steps"
+    found = [_of(row, "success", seat) for row in chosen]
+    success = [value for value in found if value is not None]
+    if success:
+        words += f", success {np.mean(success):.3f}"
+    lines = [words]
+    if success and not any(success):
+        lines.append("none of these episodes succeeded")
+    if steps < config.batch_size:
+        lines.append(f"these are fewer steps than a batch has, {config.batch_size}")
+    for agent, driver in config.drivers.items():
+        others = _drivers(files, int(agent.removeprefix("paddle_")), seat) - {driver}
+        if others:
+            lines.append(
+                f"{agent} is {driver} in evaluations, and in some recordings "
+                f"{', '.join(sorted(others))}; --driver {agent}=NAME chooses"
+            )
+    return lines
+
+
+def _of(row: dict[str, Any], name: str, seat: int) -> float | None:
+    """Return a number of a seat in a row of episodes; None if it is not there."""
+    values = row.get(name) or []
+    return float(values[seat]) if seat < len(values) else None
+
+
+def _drivers(files: Sequence[Path], i: int, seat: int) -> set[str]:
+    """Return who plays against a policy at paddle i in recordings, by name."""
+    players = [read_head(path)["players"] for path in files]
+    return {str(each[0 if i == seat else i]["driver"]) for each in players}
