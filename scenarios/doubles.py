@@ -14,6 +14,16 @@ class Doubles(Versus):
     apart: float = 0.24
     """Distance of mates at the start (m)."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        paddle = 2 * self.table_geometry.paddle_radius
+        widest = self.table_geometry.size[1] - paddle
+        if not paddle <= self.apart <= widest:
+            raise ValueError(
+                f"apart: {self.apart:g} m, but paddles have room from {paddle:.3f} to "
+                f"{widest:.3f} m"
+            )
+
     @property
     def lineup(self) -> tuple[tuple[int, float], ...]:
         y = self.apart / 2

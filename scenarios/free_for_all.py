@@ -23,6 +23,9 @@ from marl_airhockey.toolkit import (
     serves,
 )
 
+START = 0.7
+"""Distance of paddles from the centre at the start, in inradii."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class FreeForAll(Scenario):
@@ -57,6 +60,12 @@ class FreeForAll(Scenario):
         super().__post_init__()
         if self.sides < 3:
             raise ValueError(f"sides: {self.sides} must be at least 3")
+        between = START * self.table_geometry.offsets[0] * np.sin(np.pi / self.sides)
+        if between < self.table_geometry.paddle_radius:
+            raise ValueError(
+                f"sides: paddles of {self.sides} overlap at the start; give more "
+                f"inradius than {self.inradius:g} m"
+            )
 
     @cached_property
     def table_geometry(self) -> Table:
@@ -76,7 +85,7 @@ class FreeForAll(Scenario):
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state, table = self.scene.still_state(worlds), self.table_geometry
-        state.paddle[:] = -0.7 * table.offsets[0] * table.normals
+        state.paddle[:] = -START * table.offsets[0] * table.normals
         first = np.floor(rng.uniform(0.0, self.sides))
         serves.serve_all(rng, self.scene, state, self._toward(first))
         return state, self.initial_memory(state, rng)

@@ -18,6 +18,7 @@ from marl_airhockey.contracts.mark import Mark, Meaning
 from marl_airhockey.contracts.observable import Observable
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
+from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import SEAT_KINDS, Seat, make_seat
@@ -97,7 +98,10 @@ class Scenario(ABC):
             found = _elements(name, getattr(self, name), sizes)
             object.__setattr__(self, name, found)
         for f in fields(self):
-            _check_number(f.name, f.type, getattr(self, f.name))
+            value = getattr(self, f.name)
+            if isinstance(value, np.generic):
+                object.__setattr__(self, f.name, value := value.item())
+            _check_number(f.name, f.type, value)
         if self.seconds == 0:
             raise ValueError("seconds: must be above 0")
         if self.obstacles and not self.scene.obstacles:
@@ -358,8 +362,11 @@ def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
             raise ValueError(f"{name}: {value!r} must be lists of {words} numbers")
         if element[2] <= 0:
             raise ValueError(f"{name}: element {k}, {element}: radius must be above 0")
-        if name == "drag_regions" and element[3] < 0:
-            raise ValueError(f"{name}: element {k}, {element}: drag is below 0")
+        most = PARAMETERS["puck_damping"].high
+        if name == "drag_regions" and not 0 <= element[3] <= most:
+            raise ValueError(
+                f"{name}: element {k}, {element}: drag must be in 0 .. {most:g} 1/s"
+            )
     return found
 
 
@@ -384,7 +391,8 @@ def _check_number(name: str, kind: object, value: object) -> None:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError(f"{name}: expected a number, got {value!r}")
     least = 1 if whole else 0
-    if not (np.isfinite(value) and value >= least) or (whole and value != int(value)):
+    fits = isinstance(value, int) or not whole
+    if not (np.isfinite(value) and value >= least and fits):
         words = "a whole number of at least 1" if whole else "a number of at least 0"
         raise ValueError(f"{name}: {value!r} must be {words}")
 

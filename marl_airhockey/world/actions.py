@@ -96,8 +96,10 @@ class Actions:
             episode: Counters and physics of the running episodes.
 
         Raises:
-            ValueError: A wrong shape.
+            ValueError: A wrong shape, or a paddle prescribed at infinity.
         """
+        if prescribed is not None and np.isinf(prescribed).any():
+            raise ValueError("prescribed: no element may be infinite")
         if actions.shape != self._shape:
             raise ValueError(
                 f"actions: expected shape {self._shape}, got {actions.shape}"

@@ -17,7 +17,26 @@ import numpy as np
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import Bodies, State
-from marl_airhockey.types import Memory
+from marl_airhockey.types import Array, Memory
+
+
+def checked_worlds(worlds: object, count: int) -> Array:
+    """Return indices (W,) of some of ``count`` worlds; None for all.
+
+    Raises:
+        ValueError: Not whole numbers, none at all, one twice, or one that is no world.
+    """
+    if worlds is None:
+        return np.arange(count)
+    found = np.asarray(worlds)
+    if found.ndim != 1 or found.dtype.kind not in "iu" or not len(found):
+        raise ValueError(f"worlds: expected indices of worlds, got {worlds!r}")
+    odd = found[(found < 0) | (found >= count)]
+    if len(odd):
+        raise ValueError(f"worlds: there is no world {odd[0]}, only {count} from 0 on")
+    if len(np.unique(found)) < len(found):
+        raise ValueError(f"worlds: {worlds!r} names one twice")
+    return found
 
 
 def settled(state: State, scene: Scene, count: int) -> State:
@@ -33,6 +52,8 @@ def settled(state: State, scene: Scene, count: int) -> State:
     Raises:
         ValueError: another scene, or a field of a wrong shape or not finite, named.
     """
+    if not isinstance(state, State):
+        raise ValueError(f"state: expected a State, got {type(state).__name__}")
     if _counts(state.bodies) != _counts(scene.bodies):
         raise ValueError(
             f"state: it is of another scene, with {_counts(state.bodies)}; here there "
@@ -41,7 +62,10 @@ def settled(state: State, scene: Scene, count: int) -> State:
     rest = scene.still_state(count)
     fields: dict[str, Any] = {}
     for name in ("position", "velocity", "angle", "spin", "time"):
-        wanted, value = getattr(rest, name), np.asarray(getattr(state, name))
+        wanted, value = (
+            getattr(rest, name),
+            _numbers(f"state.{name}", getattr(state, name)),
+        )
         if value.ndim == wanted.ndim - 1 and count == 1:
             value = value[None]
         if value.shape != wanted.shape:
@@ -63,6 +87,21 @@ def settled(state: State, scene: Scene, count: int) -> State:
     return replace(made, touching=near)
 
 
+def _numbers(name: str, given: object) -> Array:
+    """Return an array of real numbers.
+
+    Raises:
+        ValueError: Something else, named.
+    """
+    try:
+        found = np.asarray(given)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
+    if found.dtype.kind not in "biuf":
+        raise ValueError(f"{name}: expected numbers, got {found.dtype}")
+    return found
+
+
 def _counts(bodies: Bodies) -> str:
     """Return how many bodies of each kind there are, in words."""
     kinds = ("paddles", "pucks", "blocks", "obstacles")
@@ -78,7 +117,8 @@ def checked_memory(memory: Memory, like: Memory, count: int) -> Memory:
         count: W.
 
     Raises:
-        ValueError: a missing or unknown name, or a wrong shape, named.
+        ValueError: a missing or unknown name, a wrong shape, or what is no number,
+            named.
     """
     for name in memory:
         if name not in like:
@@ -87,12 +127,15 @@ def checked_memory(memory: Memory, like: Memory, count: int) -> Memory:
     for name, kept in like.items():
         if name not in memory:
             raise ValueError(f"memory: {name!r} is missing")
-        value, shape = np.asarray(memory[name]), (count, *kept.shape[1:])
+        value = _numbers(f"memory {name!r}", memory[name])
+        shape = (count, *kept.shape[1:])
         if value.shape == shape[1:] and count == 1:
             value = value[None]
         if value.shape != shape:
             raise ValueError(
                 f"memory {name!r}: expected shape {shape}, got {value.shape}"
             )
+        if np.isnan(value).any():
+            raise ValueError(f"memory {name!r}: no element may be nan")
         rows[name] = value
     return rows

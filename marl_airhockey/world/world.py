@@ -38,7 +38,7 @@ from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.placement import check_placement
 from marl_airhockey.world.referee import Referee
 from marl_airhockey.world.sensed_memory import SensedMemory
-from marl_airhockey.world.set_state import checked_memory, settled
+from marl_airhockey.world.set_state import checked_memory, checked_worlds, settled
 from marl_airhockey.world.step_result import StepResult
 
 NOWHERE = np.zeros(0, np.int64)
@@ -298,14 +298,16 @@ class World:
 
         Raises:
             RuntimeError: before the first `reset`.
-            ValueError: a wrong shape, a number that is not finite, or a body off the
-                table, out of its reach, in another one or too fast, named.
+            ValueError: a wrong shape, a number that is not finite, a time before the
+                episode or after its end, or a body off the table, out of its reach, in
+                another one or too fast, named.
         """
         if self._step is None:
             self._refuse_closed("set_state")
             raise RuntimeError("set_state: call reset() first, which draws the physics")
-        worlds = np.arange(self.num_worlds) if worlds is None else np.asarray(worlds)
+        worlds = checked_worlds(worlds, self.num_worlds)
         rows = settled(state, self.scene, len(worlds))
+        longest = self.max_cycles * self.control_dt
         if memory is None:
             rng = self._streams.of("start", worlds)
             memory = self.scenario.initial_memory(rows, rng)
@@ -314,7 +316,7 @@ class World:
         parked = self.scenario.eliminated(memory)
         if parked is None:
             parked = np.zeros((len(worlds), len(self.scene.seats)), np.bool_)
-        check_placement(rows, self.scene, parked)
+        check_placement(rows, self.scene, parked, longest)
         self._key_scatter(worlds)
         self._begin(worlds, rows, memory)
         self._episode.cycles[worlds] = np.round(rows.time / self.control_dt)

@@ -75,3 +75,21 @@ def test_a_scored_puck_comes_back_beside_the_others(backend):
     assert (world.memory["goals"] == [1, 0]).all()
     assert (np.abs(world.state.puck[:, 0, 0]) < 0.13).all()
     assert room(world.scene, world.state).min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("doubles", {"apart": 0.6}, "apart: 0.6 m, but paddles have room from"),
+        ("doubles", {"apart": 0.05}, "apart: 0.05 m"),
+        ("free_for_all", {"sides": 24, "goal_width": 0.05}, "sides: paddles of 24"),
+        ("duel", {"pucks": 2.0}, "pucks: 2.0 must be a whole number"),
+    ],
+)
+def test_games_that_cannot_begin_are_refused(name, options, words):
+    with pytest.raises(ValueError, match=words):
+        ah.make_world(name, 1, options=options)
+
+
+def test_numbers_of_numpy_are_numbers():
+    assert ah.make_world("duel", 1, options={"pucks": np.int64(2)}).scene.pucks == 2

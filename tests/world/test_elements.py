@@ -114,7 +114,8 @@ def test_elements_are_drawn():
         ({"obstacles": 3}, "obstacles.*3 or 5 numbers"),
         ({"obstacles": [[0.2, 0.0, -0.1]]}, "obstacles.*above 0"),
         ({"reward_regions": [[0.2, 0.0, 0.1]]}, "reward_regions.*4 numbers"),
-        ({"drag_regions": [[0.2, 0.0, 0.1, -1.0]]}, "drag_regions.*below 0"),
+        ({"drag_regions": [[0.2, 0.0, 0.1, 1e5]]}, r"drag must be in 0 \.\. 10 1/s"),
+        ({"drag_regions": [[0.2, 0.0, 0.1, -1.0]]}, "drag_regions.*must be in 0"),
     ],
 )
 def test_bad_elements_are_refused_by_name(options, words):
@@ -151,3 +152,16 @@ def test_goals_that_follow_from_a_shot_do_not_hinder_a_start():
     world = ah.make_world("hit_goal_velocity", 8, options=post)
     world.reset(0)
     assert np.isfinite(world.memory["goal"]).all()
+
+
+def test_a_puck_between_a_paddle_and_an_obstacle_stays_out_of_it(backend):
+    posts = {"obstacles": [[-0.3, 0.0, 0.06]]}
+    world = ah.make_world("duel", 1, backend=backend, options=posts)
+    world.reset(0)
+    state, memory = world.get_state()
+    state.puck[0, 0], state.puck_velocity[:] = (-0.39275, 0.0), 0.0
+    state.paddle[0, 0], state.paddle_velocity[0, 0] = (-0.57215, 0.0), (3.0, 0.0)
+    world.set_state(state, memory)
+    world.step(np.array([[[1.0, 0.0], [0.0, 0.0]]]))
+    assert rooms(world, world.state.puck, world.scene.table.puck_radius).min() > -1e-3
+    world.set_state(*world.get_state())

@@ -136,6 +136,16 @@ def test_a_memory_of_its_own_begins_an_episode_anywhere(scenario):
         ({"position": np.zeros((1, 3, 2))}, "state.position: expected shape"),
         ({"velocity": np.full((1, 2, 2), np.nan)}, "state.velocity: every element"),
         ({"time": np.full(1, np.inf)}, "state.time: every element"),
+        ({"time": np.full(1, -3.0)}, "state: its time is 3 s before the episode"),
+        ({"time": np.full(1, 1e6)}, "state: its time is 1e.06 s; at most 15 is"),
+        ({"spin": np.full((1, 2), 1e300)}, "paddle_0 spins at .* m/s at its rim"),
+        (
+            {"position": np.zeros((1, 2, 2), complex)},
+            "state.position: expected numbers",
+        ),
+        ({"velocity": np.full((1, 2, 2), "a")}, "state.velocity: expected numbers"),
+        ({"velocity": [[[0.0, 0.0], [0.0]]]}, "state.velocity: .*inhomogeneous"),
+        ({"angle": None}, "state.angle: expected numbers, got object"),
     ],
 )
 def test_a_bad_state_is_named(change, words):
@@ -156,6 +166,49 @@ def test_a_bad_memory_is_named():
         world.set_state(state, memory | {"hit": memory["hits"]})
     with pytest.raises(ValueError, match="memory 'hits': expected shape"):
         world.set_state(state, memory | {"hits": np.zeros(3)})
+    with pytest.raises(ValueError, match="memory 'hits': no element may be nan"):
+        world.set_state(state, memory | {"hits": np.full(2, np.nan)})
+    with pytest.raises(ValueError, match="memory 'hits': expected numbers"):
+        world.set_state(state, memory | {"hits": np.array(["a", "b"])})
+    with pytest.raises(ValueError, match="expected a State, got dict"):
+        world.set_state({"time": 0.0}, memory)
+
+
+@pytest.mark.parametrize(
+    ("worlds", "words"),
+    [
+        ([0, 7], "there is no world 7, only 3"),
+        ([-1], "there is no world -1"),
+        ([True, False], "expected indices"),
+        ([0.0], "expected indices"),
+        (1, "expected indices"),
+        ([], "expected indices"),
+        ([1, 1], "names one twice"),
+    ],
+)
+def test_worlds_that_are_none_are_named(worlds, words, backend):
+    world = ah.make_world("juggle", 3, backend=backend)
+    world.reset(0)
+    state, memory = world.get_state()
+    count = np.size(worlds)
+    rows = state.map(lambda x: x[:count])
+    some = {name: value[:count] for name, value in memory.items()}
+    with pytest.raises(ValueError, match=f"worlds: .*{words}"):
+        world.set_state(rows, some, worlds)
+    np.testing.assert_array_equal(world.state.position, state.position)
+
+
+def test_a_refused_state_does_not_begin_an_episode():
+    vec = ah.make_vec("juggle", 2, max_cycles=3, autoreset_mode="Disabled")
+    vec.reset(seed=0)
+    for _ in range(3):
+        vec.step(np.zeros((2, 2), np.float32))
+    states, memories = vec.get_state()
+    states.puck[:] = 3.0
+    with pytest.raises(ValueError, match="off the table"):
+        vec.set_state(states, memories)
+    with pytest.raises(RuntimeError, match="ended"):
+        vec.step(np.zeros((2, 2), np.float32))
 
 
 def test_a_state_needs_a_reset_before_it():
@@ -196,7 +249,7 @@ def test_environments_take_states_too():
         (
             "duel",
             {"puck_0": (2.0, 0.0)},
-            "puck_0 .* 11.. mm; at most 10 is",
+            "puck_0 .* 11.. mm; at most 20 is",
         ),
         ("duel", {"puck_0": (0.0, 0.3)}, "puck_0 is off the table by 26.9"),
         ("duel", {"puck_0": (0.9, 0.0)}, "puck_0 is off the table by 61.8"),
@@ -255,6 +308,31 @@ def test_a_paddle_that_has_left_the_game_is_behind_its_side(backend):
     alive = {**kept[1], "lives": np.full((1, 4), 3.0)}
     with pytest.raises(ValueError, match="paddle_2 is off the table"):
         world.set_state(kept[0], alive)
+
+
+def test_states_of_paddles_that_are_moved_from_outside_can_be_set(backend):
+    world = ah.make_world("duel", 16, backend=backend)
+    world.reset(0)
+    corners = [np.array(seat.reach) for seat in world.scene.seats]
+    refused = 0
+    for _ in range(100):
+        moved = np.full((16, 2, 4), np.nan)
+        for k, rotation in enumerate(world.reach.rotation):
+            paddle, puck = world.state.paddle[:, k], world.state.puck[:, 0]
+            aim = np.clip(puck @ rotation.T, corners[k].min(0), corners[k].max(0))
+            way = aim - paddle @ rotation.T
+            far = np.linalg.norm(way, axis=-1, keepdims=True)
+            way *= np.minimum(1.0, 0.1 / np.maximum(far, 1e-9))
+            moved[:, k] = np.concatenate([paddle @ rotation.T + way, way / 0.05], -1)
+        world.step(np.zeros((16, 2, 2)), moved)
+        gap = world.state.paddle - world.state.puck
+        refused += (np.linalg.norm(gap, axis=-1) < 0.06).sum()
+        world.set_state(*world.get_state())
+    if backend == "numba":
+        assert refused > 3, "no puck was jammed by more than 2 cm"
+    moved[0, 0] = np.inf
+    with pytest.raises(ValueError, match="prescribed: no element may be infinite"):
+        world.step(np.zeros((16, 2, 2)), moved)
 
 
 @pytest.mark.parametrize("name", ["duel", "doubles", "strike_crowd", "move_block"])

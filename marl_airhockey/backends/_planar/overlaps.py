@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from marl_airhockey.backends._planar.walls import depth_in_side
+from marl_airhockey.core.limits import away
 from marl_airhockey.jit.cache import compiled
 from marl_airhockey.types import Array
 
@@ -23,6 +24,7 @@ def give_way(
     holds: Array,
     absent: Array,
     lines: Array,
+    posts: Array,
 ) -> bool:
     """Move discs apart: pucks give way first, then paddles, which stop there.
 
@@ -35,6 +37,7 @@ def give_way(
         holds: (paddles,) bool: does not give way.
         absent: (N,) bool: touches nothing.
         lines: `walls.sides`.
+        posts: (obstacles, 5) both ends, and the distance that centres of pucks keep, m.
 
     Returns:
         True if anything moved.
@@ -52,6 +55,13 @@ def give_way(
                     deepest = max(deepest, deep)
                     position[j, 0] += deep * lines[s, 0]
                     position[j, 1] += deep * lines[s, 1]
+            for k in range(len(posts)):
+                nx, ny, room = away(posts[k], position[j, 0], position[j, 1])
+                deep = -room - SLOP
+                if deep > 0.0:
+                    deepest = max(deepest, deep)
+                    position[j, 0] += deep * nx
+                    position[j, 1] += deep * ny
             for i in range(j):
                 nx = position[j, 0] - position[i, 0]
                 ny = position[j, 1] - position[i, 1]

@@ -65,6 +65,11 @@ class Space:
         self._pinned = np.zeros(bodies.pucks)
         self.bodies, self._walls = Bodies(space, scene), Walls(space, scene)
         self._sides, self._elapsed = sides(scene), 0.0
+        keeps = scene.table.puck_radius
+        rows = [
+            (*o.start, *(o.end or o.start), o.radius + keeps) for o in scene.obstacles
+        ]
+        self._posts = np.array(rows, float).reshape(-1, 5)
         self._radius = np.array(bodies.radius)[: bodies.paddles + bodies.pucks]
         self._reach = reaches(scene.table, scene.seats)
         self._held = np.zeros(bodies.paddles, np.bool_)
@@ -420,7 +425,7 @@ class Space:
         absent[:paddles] = raised
         absent[[paddles + k for k in self._out]] = True
         before = places.copy()
-        what = self._radius, paddles, imposed, absent, self._sides
+        what = self._radius, paddles, imposed, absent, self._sides, self._posts
         if not give_way(places, velocity, *what):
             return
         position[:] = places[:paddles]
