@@ -63,7 +63,8 @@ class Scene:
             length = float(((end - start) ** 2).sum() ** 0.5)
             if goal_line.width is not None and not 0 < goal_line.width < length:
                 raise ValueError(
-                    f"scene.goal_lines: {goal_line.name!r} is wider than its side"
+                    f"scene.goal_lines: {goal_line.name!r} is {goal_line.width:g} m "
+                    f"wide; that must be above 0 and below its side's {length:.3g} m"
                 )
 
     def opening(self, goal_line: GoalLine) -> Array:

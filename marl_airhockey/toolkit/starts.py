@@ -208,4 +208,6 @@ def redraw(
         some = rng.select(again)
         some.spread = some.spread if k < NARROW_TRIES else 1.0
         rows[again] = sample(some)
-    raise RuntimeError("start: no acceptable first state in 1000 tries")
+    raise RuntimeError(
+        "start: no acceptable first state in 1000 tries; are there too many bodies?"
+    )

@@ -161,6 +161,14 @@ def test_what_is_no_setting_is_not_taken_for_one(expert, name):
         make_config("bc", "reach", [expert], {name: "touch"})
 
 
+def test_python_takes_one_path_of_data(expert, tmp_path):
+    few = SMALL | {"total_steps": 100, "evaluations": 1, "eval_episodes": 2}
+    found = ah.train("reach", tmp_path, algo="td3_bc", data=str(expert), **few)
+    assert found.steps == 100
+    columns = (tmp_path / "progress.csv").read_text().splitlines()[0]
+    assert {"train/actor", "train/critic"} <= {*columns.split(",")}
+
+
 def test_observations_that_are_not_finite_are_named(tmp_path):
     path = record(tmp_path, "random", "reach", 2)
     part = next(path.glob("steps/*.parquet"))
