@@ -23,7 +23,7 @@ class Mark(NamedTuple):
     radius: float = 0.0
     """m"""
     means: Meaning = "goal"
-    """What a circle is: a goal, or a region with a reward, a cost or a drag"""
+    """Meaning of a circle: a goal, or a region with a reward, a cost or a drag"""
 
     @staticmethod
     def circle(centre: Array, radius: float, means: Meaning = "goal") -> Mark:

@@ -39,6 +39,10 @@ KINDS = "biuf"
 FINITE = (
     *("state.position", "state.velocity", "state.angle", "state.spin", "state.time"),
     *("action", "command", "reward", "observation"),
+    *(
+        f"observation.{name}"
+        for name in ("observation", "achieved_goal", "desired_goal")
+    ),
 )
 """Columns in which no number may be missing"""
 Columns = dict[str, Array]

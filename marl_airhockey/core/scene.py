@@ -64,7 +64,7 @@ class Scene:
             if goal_line.width is not None and not 0 < goal_line.width < length:
                 raise ValueError(
                     f"scene.goal_lines: {goal_line.name!r} is {goal_line.width:g} m "
-                    f"wide; that must be above 0 and below its side's {length:.3g} m"
+                    f"wide; that must be between 0 and the {length:.3g} m of its side"
                 )
 
     def opening(self, goal_line: GoalLine) -> Array:

@@ -85,7 +85,7 @@ def read_episode_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def missing_steps(path: Path) -> dict[int, str]:
-    """Return what lacks at the ends of episodes, in words by episode.
+    """Return messages about steps that lack at the ends of episodes, by episode.
 
     An episode whose recording was interrupted lacks nothing, and `episodes_of` names
     one of which all is missing before another.

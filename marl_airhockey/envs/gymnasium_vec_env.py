@@ -132,9 +132,9 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
     ) -> Any:
         """Go on from given states, see `World.set_state`; return the observations."""
-        seen = _rows(self.world.set_state(state, memory, worlds))
+        observations = _rows(self.world.set_state(state, memory, worlds))
         self._ended[slice(None) if worlds is None else worlds] = False
-        return seen
+        return observations
 
     def step(self, actions: Array) -> tuple[Any, Array, Array, Array, dict[str, Any]]:
         """Move all worlds by one control step; actions (B, 2).

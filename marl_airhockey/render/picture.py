@@ -42,6 +42,7 @@ CIRCLES: dict[Meaning, Colour] = {
     "cost": (213, 94, 0),
     "drag": (105, 116, 134),
 }
+"""Colours of circles by what they mean"""
 SIGNS: dict[Meaning, list[tuple[float, float, float, float]]] = {
     "reward": [(-1, 0, 1, 0), (0, -1, 0, 1)],
     "cost": [(-1, 0, 1, 0)],

@@ -26,8 +26,8 @@ FASTEST = 50.0
 def check_placement(state: State, scene: Scene, parked: Array, longest: float) -> None:
     """Refuse rows of a state in which a body is where, or as fast as, none can be.
 
-    A paddle that is moved from outside may be over a puck, and one that a mate pushes
-    in an obstacle.
+    A paddle that is moved from outside may be over a puck, and one that a teammate
+    pushes in an obstacle.
 
     Args:
         state: rows (W,) of bodies.

@@ -298,9 +298,9 @@ class World:
 
         Raises:
             RuntimeError: before the first `reset`.
-            ValueError: a wrong shape, a number that is not finite, a time before the
-                episode or after its end, or a body off the table, out of its reach, in
-                another one or too fast, named.
+            ValueError: an index that is no world, a wrong shape, a number that is not
+                finite, a time before the episode or after its end, or a body off the
+                table, out of its reach, in another one or too fast, named.
         """
         if self._step is None:
             self._refuse_closed("set_state")

@@ -314,7 +314,7 @@ def test_states_of_paddles_that_are_moved_from_outside_can_be_set(backend):
     world = ah.make_world("duel", 16, backend=backend)
     world.reset(0)
     corners = [np.array(seat.reach) for seat in world.scene.seats]
-    refused = 0
+    jammed = 0
     for _ in range(100):
         moved = np.full((16, 2, 4), np.nan)
         for k, rotation in enumerate(world.reach.rotation):
@@ -326,10 +326,10 @@ def test_states_of_paddles_that_are_moved_from_outside_can_be_set(backend):
             moved[:, k] = np.concatenate([paddle @ rotation.T + way, way / 0.05], -1)
         world.step(np.zeros((16, 2, 2)), moved)
         gap = world.state.paddle - world.state.puck
-        refused += (np.linalg.norm(gap, axis=-1) < 0.06).sum()
+        jammed += (np.linalg.norm(gap, axis=-1) < 0.06).sum()
         world.set_state(*world.get_state())
     if backend == "numba":
-        assert refused > 3, "no puck was jammed by more than 2 cm"
+        assert jammed > 3, "no puck was jammed by more than 2 cm"
     moved[0, 0] = np.inf
     with pytest.raises(ValueError, match="prescribed: no element may be infinite"):
         world.step(np.zeros((16, 2, 2)), moved)

@@ -189,14 +189,14 @@ class AirHockeyArena(Arena):
         end: tuple[float, float] | None,
         radius: float,
     ) -> None:
-        name, seen = f"obstacle{k}", {"material": "rail", **_visual()}
+        name, visual = f"obstacle{k}", {"material": "rail", **_visual()}
         ends = [start] if end is None or end == start else [start, end]
         for i, point in enumerate(ends):
             post = {
                 "size": array_to_string([radius, TALL]),
                 "pos": array_to_string([*point, TALL]),
             }
-            self._add(f"{name}_{i}_visual", "cylinder", **post, **seen)
+            self._add(f"{name}_{i}_visual", "cylinder", **post, **visual)
         shape = post
         if len(ends) == 2:
             (ax, ay), (bx, by) = ends
@@ -209,7 +209,7 @@ class AirHockeyArena(Arena):
                 "pos": array_to_string([(ax + bx) / 2, (ay + by) / 2, TALL]),
                 "xyaxes": array_to_string([bx - ax, by - ay, 0, ay - by, bx - ax, 0]),
             }
-            self._add(f"{name}_visual", "box", **bar, **seen)
+            self._add(f"{name}_visual", "box", **bar, **visual)
         self._add(name, "capsule", priority="3", **shape, **_sliding(SLIDES | RAIL))
 
 

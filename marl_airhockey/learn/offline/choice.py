@@ -56,6 +56,6 @@ def _of(row: dict[str, Any], name: str, seat: int) -> float | None:
 
 
 def _drivers(files: Sequence[Path], i: int, seat: int) -> set[str]:
-    """Return who plays against a policy at paddle i in recordings, by name."""
+    """Return the names of the drivers of paddle i in recordings."""
     players = [read_head(path)["players"] for path in files]
     return {str(each[0 if i == seat else i]["driver"]) for each in players}

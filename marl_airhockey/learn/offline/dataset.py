@@ -123,12 +123,6 @@ def _seat_of(
         )
     if seat >= shown.shape[1]:
         raise ValueError(f"{where}: there is no seat {seat}")
-    odd = np.flatnonzero(~np.isfinite(shown[:, seat]).all(-1))
-    if len(odd):
-        raise ValueError(
-            f"{where}: its observation is not finite at step {odd[0]}; "
-            "airhockey data repair leaves such episodes out"
-        )
     action = columns["action"][:, seat]
     return {
         "observation": shown[:-1, seat],
