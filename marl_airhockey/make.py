@@ -1,38 +1,32 @@
 """Build environments by name: the public face of the library.
 
-What needs gymnasium, pettingzoo or stable-baselines3 is imported when it is built.
+What an environment needs is imported when it is built.
 """
 
 from __future__ import annotations
 
-import re
-from functools import partial
-from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, Unpack
-
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.errors import UnknownKeywordError, unknown_keyword
-from marl_airhockey.registry import make_scenario, scenario_names
-from marl_airhockey.world.world import World
 
 if TYPE_CHECKING:
     from gymnasium.vector import AutoresetMode
     from pettingzoo.utils.env import AECEnv
 
+    from marl_airhockey.contracts.scenario import Scenario
     from marl_airhockey.envs.gymnasium_env import AirHockeySingleEnv
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
     from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
-from marl_airhockey.world.build import Keywords, build_world
+    from marl_airhockey.world.build import Keywords
+    from marl_airhockey.world.world import World
 
 
 def make_world(
     scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> World:
     """Build B worlds as arrays: ``reset(seed)``, ``step(actions (B, open, 2))``."""
+    from marl_airhockey.world.build import build_world
+
     return build_world(scenario, num_worlds, autoreset=True, keywords=keywords)
 
 
@@ -94,6 +88,7 @@ def make_vec(
         render_mode: None or "rgb_array": a picture of each world.
         **keywords: See `build.build_world`.
     """
+    from marl_airhockey.core.errors import UnknownKeywordError, unknown_keyword
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
 
     if "num_envs" in keywords:
@@ -138,45 +133,3 @@ def make_torchrl(
     from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
 
     return AirHockeyTorchEnv(scenario, num_worlds, device, **keywords)
-
-
-VERSIONED = re.compile(r"([a-z]\w*)_v(\d+)")
-"""Name of a scenario and its version."""
-
-
-class GameFinder(MetaPathFinder, Loader):
-    """Finder of modules as PettingZoo's own games are: ``duel_v0.parallel_env()``.
-
-    They are found by ``from marl_airhockey import duel_v0`` and by
-    ``import marl_airhockey.duel_v0``.
-    """
-
-    def find_spec(
-        self, fullname: str, path: object, target: object = None
-    ) -> ModuleSpec | None:
-        """Return the spec of a scenario with a version; None for all else.
-
-        Raises:
-            ImportError: another version of a scenario.
-        """
-        package, _, name = fullname.rpartition(".")
-        found = VERSIONED.fullmatch(name)
-        if package != __package__ or not found or found[1] not in scenario_names():
-            return None
-        current = make_scenario(found[1]).version
-        if int(found[2]) != current:
-            raise ImportError(
-                f"{name}: this release of marl_airhockey plays {found[1]}_v{current}"
-            )
-        return ModuleSpec(fullname, self, loader_state=found[1])
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType:
-        """Return the module of a game."""
-        module = ModuleType(spec.name, f"PettingZoo game {spec.loader_state}.")
-        vars(module)["parallel_env"] = partial(parallel_env, spec.loader_state)
-        vars(module)["env"] = partial(env, spec.loader_state)
-        vars(module)["raw_env"] = module.env
-        return module
-
-    def exec_module(self, module: ModuleType) -> None:
-        """Do nothing: the module is whole."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import inspect
-import pkgutil
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -16,18 +15,13 @@ from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.discovery import names_in
 from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
 from marl_airhockey.policies.callables import driver_of
 from marl_airhockey.policies.load import ZOO, load_policy
 
 DEFAULT_BACKEND = "numba"
 """Name of the backend that is used unless another is asked for."""
-
-
-def _names(folder: str) -> list[str]:
-    package = importlib.import_module(f"marl_airhockey.{folder}")
-    found = pkgutil.iter_modules(package.__path__)
-    return sorted(m.name for m in found if not m.name.startswith("_"))
 
 
 def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
@@ -38,7 +32,7 @@ def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
 
 def _maker(kind: str, folder: str, group: str, name: str) -> Callable[..., object]:
     """Return what makes the scenario or driver of a name, ours or a plugin's."""
-    own, others = _names(folder), plugins(group)
+    own, others = names_in(folder), plugins(group)
     if name in own or name not in others:
         module = _load(kind, folder, name, sorted({*own, *others}))
         return cast(Callable[..., object], module.make)
@@ -47,7 +41,7 @@ def _maker(kind: str, folder: str, group: str, name: str) -> Callable[..., objec
 
 def scenario_names() -> list[str]:
     """Return the names of all scenarios of ours: the files of ``scenarios/``."""
-    return _names("scenarios")
+    return names_in("scenarios")
 
 
 def plugin_names(kind: str) -> list[str]:
@@ -55,17 +49,9 @@ def plugin_names(kind: str) -> list[str]:
     return sorted(plugins(kind))
 
 
-def gymnasium_id(name: str) -> str:
-    """Return the gymnasium id of a scenario, its version included."""
-    module = _load("scenario", "scenarios", name, scenario_names())
-    camel = "".join(word.capitalize() for word in name.split("_"))
-    version = cast(type[Scenario], module.make).version
-    return f"marl_airhockey/{camel}-v{version}"
-
-
 def agent_names() -> list[str]:
     """Return the names of all drivers: the files of ``agents/``."""
-    return _names("agents")
+    return names_in("agents")
 
 
 def program_names() -> list[str]:
@@ -89,7 +75,7 @@ def agent_class(name: str) -> type[Driver]:
 
 def backend_names() -> list[str]:
     """Return the names of all backends: the folders of ``backends/``."""
-    return _names("backends")
+    return names_in("backends")
 
 
 def make_scenario(name: str, **options: Any) -> Scenario:

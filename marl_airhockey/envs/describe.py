@@ -14,12 +14,12 @@ from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.profiles import PROFILES, delay_of, find_profile
 from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
 from marl_airhockey.registry import (
     agent_names,
     backend_names,
     find_scenario,
-    gymnasium_id,
     make_scenario,
     plugin_names,
     scenario_names,

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from gymnasium.envs.registration import register
 
-from marl_airhockey.registry import gymnasium_id, scenario_names
+from marl_airhockey.discovery import gymnasium_id, names_in
 
 
 def register_all() -> None:
     """Register ``marl_airhockey/CamelCase-v0`` for every file in ``scenarios/``."""
-    for name in scenario_names():
+    for name in names_in("scenarios"):
         register(
             id=gymnasium_id(name),
             entry_point="marl_airhockey.envs.gymnasium_env:make_single",

@@ -20,7 +20,7 @@ from tianshou.highlevel.env import EnvFactoryRegistered, VectorEnvType
 from tianshou.highlevel.experiment import ExperimentConfig, SACExperimentBuilder
 
 import marl_airhockey as ah
-from marl_airhockey.registry import gymnasium_id
+from marl_airhockey.discovery import gymnasium_id
 
 
 def main(

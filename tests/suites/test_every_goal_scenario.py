@@ -8,7 +8,8 @@ from stable_baselines3 import SAC, HerReplayBuffer
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
-from marl_airhockey.registry import gymnasium_id, make_scenario
+from marl_airhockey.discovery import gymnasium_id
+from marl_airhockey.registry import make_scenario
 
 PROFILES = ("ideal", "ur5e", "gantry")
 GOAL_NAMES = ("achieved_goal", "desired_goal")

@@ -26,9 +26,9 @@ from stable_baselines3.common.env_checker import check_env as check_env_sb3
 import marl_airhockey as ah
 from marl_airhockey.contracts.scenario import Scenario, Transition
 from marl_airhockey.core.state import ARRAYS
+from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import term_meanings
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.registry import gymnasium_id
 
 CHANCE = {"still": 0.02, "random": 0.10, "sticky": 0.10}
 

@@ -36,7 +36,7 @@ from marl_airhockey.data.exchange.seats import (
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.files import shared_head
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
-from marl_airhockey.registry import gymnasium_id
+from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:

@@ -1,0 +1,38 @@
+"""Names of scenarios, agents and backends: the files of their folders, none imported.
+
+``import marl_airhockey`` registers every scenario with gymnasium, whose ids hold a
+version; importing all scenarios for that would load most of the package.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+from importlib.util import find_spec
+
+VERSION = re.compile(r"^    version: ClassVar\[int\] = (\d+)$", re.MULTILINE)
+"""Line of a scenario's file that raises its version, which is 0 otherwise"""
+
+
+def names_in(folder: str) -> list[str]:
+    """Return the names of the files of ``scenarios/``, ``agents/`` or ``backends/``."""
+    package = importlib.import_module(f"marl_airhockey.{folder}")
+    found = pkgutil.iter_modules(package.__path__)
+    return sorted(m.name for m in found if not m.name.startswith("_"))
+
+
+def version_of(scenario: str) -> int:
+    """Return the version of a scenario of ours."""
+    spec = find_spec(f"marl_airhockey.scenarios.{scenario}")
+    assert spec is not None
+    assert spec.origin is not None
+    with open(spec.origin, encoding="utf-8") as file:
+        found = VERSION.search(file.read())
+    return int(found[1]) if found else 0
+
+
+def gymnasium_id(scenario: str) -> str:
+    """Return the gymnasium id of a scenario of ours, its version included."""
+    camel = "".join(word.capitalize() for word in scenario.split("_"))
+    return f"marl_airhockey/{camel}-v{version_of(scenario)}"
