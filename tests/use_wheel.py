@@ -1,4 +1,4 @@
-"""Run by CI with the bare wheel, from outside the repository: nothing of it is near."""
+"""Run by CI with the bare wheel, from outside the repository, and an empty cache."""
 
 import contextlib
 import sys
@@ -8,6 +8,7 @@ import numpy as np
 
 import marl_airhockey as ah
 from marl_airhockey import registry
+from marl_airhockey.jit import folders, shipped
 
 assert "site-packages" in ah.__file__, ah.__file__
 assert len(ah.scenario_names()) >= 10
@@ -27,4 +28,9 @@ for driver in registry.program_names():
 with contextlib.suppress(RuntimeError):
     ah.make_sb3_vec("juggle")
     sys.exit("the bare wheel has no stable-baselines3, and must say so")
+found = list(folders.code_folder().glob("*.code"))
+if shipped.shipped().folder is None:
+    print("its compiled code does not fit:", shipped.shipped().reason)
+else:
+    assert not found, "a wheel that holds compiled code compiles nothing"
 print("the wheel works")

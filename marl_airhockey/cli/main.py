@@ -27,13 +27,13 @@ from marl_airhockey.cli import (
     listing,
     new,
     play,
+    precompile,
     study,
     teleop,
     train,
     transfer,
     trials,
     ur_emulator,
-    warm,
     watch,
 )
 from marl_airhockey.plugins import author_files
@@ -67,7 +67,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "trials": trials.trials,
     "teleop": teleop.teleop,
     "bench": bench.bench_environments,
-    "warm": warm.warm,
+    "precompile": precompile.precompile,
     "new": new.new,
 }
 """Functions of the commands, by name"""

@@ -172,6 +172,8 @@ class StreamSet:
             seeds: (W,) integer seeds, one per world.
             episodes: (W,) integer episode numbers.
         """
+        # One type, so that one compiled function serves all callers.
+        seeds = seeds.astype(np.uint64, copy=False)
         _begin(self._keys, self._counts, rows, seeds, episodes, self._salts)
 
     def keys(self, purpose: str) -> Array:

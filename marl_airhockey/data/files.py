@@ -13,7 +13,7 @@ from typing import Any
 
 from marl_airhockey.core.recording import META
 from marl_airhockey.data.reader import read_head
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 
 NAME = re.compile(r"^\w[-.\w]*(/\w[-.\w]*)*$")
 """Form of the name of an exported dataset"""

@@ -1,125 +1,45 @@
-"""Cache of compiled code: one folder for each version of the package's sources.
+"""Cache of compiled code: a file for each function, its signature and its processor.
 
-Numba's own cache checks only the file of a function itself, so a function that calls
-functions of other files would keep running their old code after an edit. Here the
-folder is named by a hash of all sources that compiled code can call: another version
-of them never sees it. Neither the location of the package nor modification times
-matter, so a fresh clone of the same sources starts with what an older one compiled.
+The name of a file holds a hash of all that its code depends on (`fingerprint`), so an
+edit compiles again just what it changes, and nothing else is loaded in its place.
+Neither the location of the package nor modification times matter, so a fresh clone of
+the same sources starts with what an older one compiled.
 """
 
 from __future__ import annotations
 
-import atexit
 import hashlib
 import os
-import shutil
+import pickle
 import sys
-import tempfile
-import time
-import warnings
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal, TypeVar, cast
 
 import numba
 from numba.core import config
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
+from numba.core.serialize import dumps
+from numba.core.sigutils import normalize_signature
 from numba.extending import register_jitable
+
+from marl_airhockey.jit.fingerprint import fingerprint
+from marl_airhockey.jit.folders import code_folder, delete_unused
+from marl_airhockey.jit.shipped import Target, shipped
 
 try:
     import fcntl
-except ImportError:  # Windows: numba's own atomic writes have to do.
+except ImportError:  # Windows: a function may be compiled by several processes.
     fcntl = None  # type: ignore[assignment]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-VARIABLE = "MARL_AIRHOCKEY_CACHE"
-"""Environment variable that names the folder of all that the library caches"""
-PACKAGES = ("backends", "contracts", "core", "devices", "jit", "sensing", "toolkit")
-"""Packages whose functions compiled code can call; their sources name the folder"""
-UNUSED = 30 * 24 * 3600.0
-"""Time after which the folder of other sources is deleted, s"""
-
-
-@cache
-def source_hash() -> str:
-    """Return a hash of the sources in `PACKAGES` and of numba's version."""
-    package = Path(__file__).parents[1]
-    digest = hashlib.sha256(numba.__version__.encode())
-    for name in PACKAGES:
-        for path in sorted((package / name).rglob("*.py")):
-            digest.update(path.relative_to(package).as_posix().encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=folder).close()
-    except OSError:
-        return False
-    return True
-
-
-def _candidates() -> Iterator[Path]:
-    if given := os.environ.get(VARIABLE):
-        yield Path(given)
-    # Without a home folder there is no `Path.home`.
-    with suppress(RuntimeError):
-        home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        yield Path(home) / "marl_airhockey"
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        yield Path(given) / "marl_airhockey"
-
-
-@cache
-def cache_folder() -> Path:
-    """Return the folder of all that the library caches.
-
-    That is MARL_AIRHOCKEY_CACHE, or else ``marl_airhockey`` in the user's cache
-    folder, or in NUMBA_CACHE_DIR if neither can be written. A read-only one is used if
-    it holds the compiled code of these sources, as in a container. If there is none, a
-    temporary folder serves this process and those that it starts, with a warning.
-    """
-    tried = []
-    for folder in _candidates():
-        if _writable(folder) or (folder / f"code-{source_hash()}").is_dir():
-            return folder
-        tried.append(str(folder))
-    folder = Path(tempfile.mkdtemp(prefix="marl_airhockey-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    os.environ[VARIABLE] = str(folder)
-    warnings.warn(
-        f"cannot write to {' or '.join(tried) or 'a home folder'}: code is compiled "
-        f"again in every process; set {VARIABLE} to a writable folder",
-        RuntimeWarning,
-        stacklevel=2,
-    )
-    return folder
-
-
-@cache
-def code_folder() -> Path:
-    """Return the folder of the code that is compiled from these sources."""
-    folder = cache_folder() / f"code-{source_hash()}"
-    # A read-only cache can be read all the same.
-    with suppress(OSError):
-        if not folder.exists():
-            _delete_unused(folder.parent)
-            folder.mkdir(parents=True)
-        os.utime(folder)
-    return folder
-
-
-def _delete_unused(root: Path) -> None:
-    """Delete the folders of other sources that nobody has used for a while."""
-    for folder in root.glob("code-*"):
-        if time.time() - folder.stat().st_mtime > UNUSED:
-            shutil.rmtree(folder, ignore_errors=True)
+used: set[Path] = set()
+"""Files of compiled code that this process has loaded or written"""
 
 
 @contextmanager
@@ -139,66 +59,82 @@ def one_process(name: str) -> Iterator[None]:
         yield
 
 
-class _Locator:
-    """Locator of a function's compiled code, as numba's caches expect one."""
+class CodeFiles:
+    """Files of one function, as numba's dispatchers expect a cache.
 
-    def __init__(self, function: Any) -> None:
-        self._name = function.__module__
-        self._line = function.__code__.co_firstlineno
-        self._py_file = function.__code__.co_filename
+    Args:
+        function: Function, as it is written.
+        name: Its fingerprint, if that is known.
+    """
 
-    @classmethod
-    def from_function(cls, function: Any, file: str) -> _Locator:
-        """Return the locator of a function."""
-        return cls(function)
+    def __init__(self, function: Any, name: str = "") -> None:
+        self._function, self._name = function, name
 
-    def ensure_cache_path(self) -> None:
-        """Make the folder."""
-        code_folder().mkdir(parents=True, exist_ok=True)
+    def paths(self, signature: Any, target: Target) -> list[Path]:
+        """Return the files that may hold the code of a signature, the best first.
 
-    def get_cache_path(self) -> str:
-        """Return the folder."""
-        return str(code_folder())
+        Args:
+            signature: Numba's types of the arguments, or a text that names them.
+            target: System, processor and features for which this process compiles.
+        """
+        if not self._name:
+            self._name = fingerprint(self._function)
+        kinds, _ = normalize_signature(signature)
+        readable = f"{self._function.__module__}.{self._function.__qualname__}"
+        readable = readable.removeprefix("marl_airhockey.")
 
-    def get_source_stamp(self) -> str:
-        """Return what must be equal for compiled code to be used."""
-        return source_hash()
+        def path(folder: Path, target: Target) -> Path:
+            depends = self._name, [str(kind) for kind in kinds], target
+            digest = hashlib.sha256(repr(depends).encode()).hexdigest()[:16]
+            return folder / f"{readable}-{digest}.code"
 
-    def get_disambiguator(self) -> str:
-        """Return a text that differs between functions of one name."""
-        name = hashlib.sha256(self._name.encode()).hexdigest()[:8]
-        return f"{name}-{self._line}"
+        paths, known = [path(code_folder(), target)], shipped()
+        if known.folder is not None:
+            paths.append(path(known.folder, known.target))
+        return paths
 
+    def exist(self, signature: Any) -> bool:
+        """Return whether there is code of a signature for this process."""
+        target = cpu_target.target_context.codegen().magic_tuple()
+        return any(path.exists() for path in self.paths(signature, target))
 
-class _Implementation(CompileResultCacheImpl):
-    _locator_classes = [_Locator]  # type: ignore[list-item]  # noqa: RUF012
-
-
-class _Cache(FunctionCache):
-    """Cache of one function, whose damaged entries are compiled again."""
-
-    _impl_class = _Implementation
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
+    def load_overload(self, signature: Any, context: Any) -> Any:
         """Return what was compiled for a signature; None if there is nothing."""
-        try:
-            return super().load_overload(sig, target_context)
-        # A damaged pickle can raise anything.
-        except Exception as error:
-            print(
-                f"marl_airhockey: the compiled code of {self._name} is damaged "
-                f"({type(error).__name__}) and is compiled again",
-                file=sys.stderr,
-            )
+        context.refresh()
+        for path in self.paths(signature, context.codegen().magic_tuple()):
+            try:
+                # Pickles of a folder that this user, or the package, has written.
+                found = pickle.loads(path.read_bytes())
+                code = CompileResult._rebuild(context, *found)
+            except OSError:
+                continue
+            # A damaged pickle can raise anything.
+            except Exception as error:
+                print(
+                    f"marl_airhockey: the compiled code in {path} is damaged "
+                    f"({type(error).__name__}) and is compiled again",
+                    file=sys.stderr,
+                )
+                continue
             with suppress(OSError):
-                self.flush()
-            return None
+                os.utime(path)
+            used.add(path)
+            return code
+        return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
+    def save_overload(self, signature: Any, code: Any) -> None:
         """Store what was compiled for a signature, if the folder can be written."""
-        # Two processes would give one name to the code of two signatures.
-        with one_process("save"), suppress(OSError):
-            super().save_overload(sig, data)
+        lifted = any(not loop.can_cache for loop in code.lifted)
+        if lifted or code.library.has_dynamic_globals:
+            return
+        path = self.paths(signature, code.codegen.magic_tuple())[0]
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            delete_unused()
+            part = path.with_suffix(f".{os.getpid()}-{threading.get_ident()}")
+            part.write_bytes(dumps(code._reduce()))
+            part.replace(path)
+            used.add(path)
 
 
 def compiled(
@@ -206,6 +142,7 @@ def compiled(
     nogil: bool = False,
     error_model: Literal["python", "numpy"] = "python",
     forceinline: bool = False,
+    name: str = "",
 ) -> Callable[[F], F]:
     """Return a decorator that compiles a function by numba and caches its code.
 
@@ -213,6 +150,7 @@ def compiled(
         nogil: Whether other threads may run meanwhile.
         error_model: "python" raises on a division by zero, "numpy" gives inf or nan.
         forceinline: Whether LLVM inlines every call.
+        name: Fingerprint of the function, if it is known.
     """
 
     def decorate(function: F) -> F:
@@ -221,7 +159,7 @@ def compiled(
         )(function)
         # With NUMBA_DISABLE_JIT it is a plain function.
         if not config.DISABLE_JIT:  # type: ignore[attr-defined]
-            dispatcher._cache = _Cache(function)
+            dispatcher._cache = CodeFiles(function, name)
         return cast("F", dispatcher)
 
     return decorate
@@ -241,6 +179,12 @@ def inner(
         error_model: see `compiled`.
         forceinline: see `compiled`.
     """
-    return register_jitable(
-        error_model=error_model, forceinline=forceinline, no_cfunc_wrapper=True
-    )
+
+    def decorate(function: F) -> F:
+        # A part of the function's fingerprint.
+        vars(function)["options"] = f"{error_model} {forceinline}"
+        return register_jitable(
+            error_model=error_model, forceinline=forceinline, no_cfunc_wrapper=True
+        )(function)
+
+    return decorate

@@ -1,25 +1,28 @@
 """Code generator: writes a tape as a module with a loop and compiles it with numba.
 
-The sources are kept in the folder of compiled code (`cache`), with what numba makes of
-them, so that a loop is compiled once per machine.
+What numba makes of them is stored in the folder of compiled code (`cache`), so that a
+loop is compiled once per machine.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack, suppress
-from pathlib import Path
+from contextlib import ExitStack
+from functools import cache
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from marl_airhockey.jit.cache import code_folder, compiled, one_process
+from marl_airhockey.jit.cache import CodeFiles, compiled, one_process
+from marl_airhockey.jit.fingerprint import fingerprint
+from marl_airhockey.jit.folders import code_folder
+from marl_airhockey.jit.lowering import loop
 from marl_airhockey.jit.notices import announced_compilation, announced_wait
+from marl_airhockey.jit.shipped import shipped
 from marl_airhockey.jit.tracer import Symbol, Tape
 from marl_airhockey.types import Array
 
@@ -90,7 +93,7 @@ class Writer:
         given = [f"s{i}[{key!r}]" for i, key in self.inputs]
         sinks = ", ".join("{" + ", ".join(sink) + "}" for sink in self._sinks)
         lines = [
-            '"""Written by marl_airhockey.jit.codegen; may be deleted at any time."""',
+            '"""Written by marl_airhockey.jit.codegen."""',
             "import numpy as np",
             "from numpy import inf, nan",
             "from marl_airhockey.jit.lowering import loop",
@@ -151,51 +154,48 @@ def load(source: str, name: str, names: Mapping[str, Any] | None = None) -> Load
         name: subject of the announcement.
         names: further global names of the module.
     """
-    digest = hashlib.sha256(source.encode()).hexdigest()[:24]
+    names = names or {}
+    called = [fingerprint(function) for function in names.values()]
+    depends = repr((source, _translation(), called))
+    digest = hashlib.sha256(depends.encode()).hexdigest()[:24]
     if digest not in _loaded:
-        path = code_folder() / f"loop_{digest}.py"
-        if path.exists():
-            _loaded[digest] = _compile(source, path, names)
-        else:
-            # Another process that needs it too waits, and then finds it.
-            with ExitStack() as stack:
-                with announced_wait(name):
-                    stack.enter_context(one_process(path.stem))
-                _compile_first(source, path, name, names)
+        module = ModuleType(f"loop_{digest}")
+        # The module must be importable when numba takes a loop from its cache.
+        sys.modules[module.__name__] = module
+        exec(compile(source, f"{module.__name__}.py", "exec"), vars(module))
+        vars(module).update(names)
+        _loaded[digest] = Loaded(_compiled(module, digest, name), module)
     return _loaded[digest]
+
+
+@cache
+def _translation() -> str:
+    """Return the fingerprint of how operations become machine code."""
+    return fingerprint(loop)
+
+
+def _compiled(module: ModuleType, digest: str, name: str) -> Callable[..., Any]:
+    """Return the kernel of a module, compiled or taken from the cache."""
+    kernel = compiled(nogil=True, error_model="numpy", name=digest)(module.kernel)
+    if not isinstance(kernel, Dispatcher):
+        return cast(Callable[..., Any], kernel)
+    files = CodeFiles(module.kernel, digest)
+    with ExitStack() as stack:
+        if not files.exist(module.SIGNATURE):
+            # Another process that needs it too waits, and then finds it.
+            with announced_wait(name):
+                stack.enter_context(one_process(module.__name__))
+            if not files.exist(module.SIGNATURE):
+                why = shipped().reason
+                stack.enter_context(announced_compilation(name, _is_first(), why))
+        kernel.compile(module.SIGNATURE)
+    kernel.disable_compile()
+    return kernel
 
 
 FEW_FUNCTIONS = 15
 """Number of functions in the cache below which most of a scenario is not there yet"""
 
 
-def _compile_first(
-    source: str, path: Path, name: str, names: Mapping[str, Any] | None
-) -> None:
-    """Compile a module that was not in the cache, and write its source there."""
-    digest = path.stem.removeprefix("loop_")
-    if path.exists():
-        _loaded[digest] = _compile(source, path, names)
-        return
-    first = len(list(path.parent.glob("*.nbi"))) < FEW_FUNCTIONS
-    with announced_compilation(name, first):
-        _loaded[digest] = _compile(source, path, names)
-    # The source comes last: where it is, its compiled code is, too.
-    with suppress(OSError):
-        part = path.with_suffix(f".{os.getpid()}")
-        part.write_text(source)
-        part.replace(path)
-
-
-def _compile(source: str, path: Path, names: Mapping[str, Any] | None) -> Loaded:
-    """Return a module, compiled or taken from the cache."""
-    module = ModuleType(path.stem)
-    # The module must be importable when numba takes a loop from its cache.
-    sys.modules[path.stem] = module
-    exec(compile(source, str(path), "exec"), vars(module))
-    vars(module).update(names or {})
-    kernel = compiled(nogil=True, error_model="numpy")(module.kernel)
-    if isinstance(kernel, Dispatcher):
-        kernel.compile(module.SIGNATURE)
-        kernel.disable_compile()
-    return Loaded(kernel, module)
+def _is_first() -> bool:
+    return len(list(code_folder().glob("*.code"))) < FEW_FUNCTIONS

@@ -31,18 +31,20 @@ _compilations: dict[str, _Notice] = {}
 
 
 @contextmanager
-def announced_compilation(name: str, first: bool) -> Iterator[None]:
+def announced_compilation(name: str, first: bool, why: str = "") -> Iterator[None]:
     """Announce a compilation, and every ten seconds that it continues.
 
     Args:
         name: Subject of the notices.
         first: Whether nothing has been compiled on this machine yet.
+        why: Why the code that comes with the package is not used, if there is any.
     """
     notice, now = _compilations.get(name), time.monotonic()
     if notice is None or now - notice.ended > PAUSE:
         notice = _compilations[name] = _Notice(now, now)
         about = FIRST if first else LATER
-        _print(f"compiling {name} once, about {about} s")
+        reason = f"; the code that comes with the package {why}" if why else ""
+        _print(f"compiling {name} once, about {about} s{reason}")
     with _repeated(f"still compiling {name}", notice):
         yield
     notice.ended = time.monotonic()

@@ -111,7 +111,8 @@ class _Compiled:
         self._rows, self._inputs = rows, inputs
         self._where = np.array(inputs.values, np.int64)
         self._strides = np.array(inputs.strides, np.int64)
-        functions = {f"f{i}": stage.function for i, stage in enumerate(stages)}
+        functions: dict[str, Any] = {"pointer": pointer}
+        functions |= {f"f{i}": stage.function for i, stage in enumerate(stages)}
         self._kernel = load(source, name, functions).kernel
 
     def __call__(self) -> bool:
@@ -177,11 +178,10 @@ def _source(stages: Sequence[Stage], inputs: _Inputs) -> str:
         call = f"f{i}({', '.join(names)})"
         calls += [f"if not {call}:", "    return False"] if stage.stops else [call]
     lines = [
-        '"""Written by marl_airhockey.jit.pipeline; may be deleted at any time."""',
+        '"""Written by marl_airhockey.jit.pipeline."""',
         *(f"# f{i}: {_called(stage.function)}" for i, stage in enumerate(stages)),
         "import numpy as np",
         "from numba import carray",
-        "from marl_airhockey.jit.pipeline import pointer",
         "SIGNATURE = 'boolean(int64[::1], int64)'",
         "def kernel(where, n):",
         *(f"    {line}" for line in [*views, *calls]),

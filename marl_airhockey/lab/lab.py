@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.arm_process import run_arm
 from marl_airhockey.lab.door import DoorClient, open_door, port_in
 from marl_airhockey.lab.faults import ARM_FAULTS, FAULTS

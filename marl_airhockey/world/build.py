@@ -226,12 +226,13 @@ def refuse_erratic(agent: str, driver: Driver, backend: Backend) -> None:
 
 def compile_world(scenario: str | Scenario, keywords: Keywords) -> None:
     """Compile all that a world needs, once per machine, restarts too."""
-    world = build_world(scenario, 2, autoreset=True, keywords=keywords)
-    world.reset(0)
-    world.max_cycles = 1
-    for _ in range(2):
-        world.step(np.zeros((2, len(world.open), 2)))
-    world.close()
+    for worlds in (1, 2):
+        world = build_world(scenario, worlds, autoreset=True, keywords=keywords)
+        world.reset(0)
+        world.max_cycles = 1
+        for _ in range(2):
+            world.step(np.zeros((worlds, len(world.open), 2)))
+        world.close()
 
 
 def _check_times(

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
 from marl_airhockey.lab.faults import ARM_FAULTS, TABLE_FAULTS
 from marl_airhockey.lab.lab import Lab, LabClient, served

@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.core.profiles import find_profile
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
 from marl_airhockey.lab.lab import Lab, LabClient, served
 from marl_airhockey.policies.load import load_policy

@@ -136,10 +136,15 @@ def test_it_tells_its_version():
     assert process("--version").stdout.split() == ["marl_airhockey", ah.__version__]
 
 
-def test_warm_compiles_and_says_so(tmp_path):
-    assert "reach" in airhockey("warm", "reach").stderr
-    done = airhockey("warm", "jugle", ok=False)
-    assert "unknown scenario 'jugle'" in done.stderr
+def test_precompile_reports_what_it_compiles_and_names_bad_input(tmp_path):
+    assert "reach" in airhockey("precompile", "reach").stderr
+    for words, reason in (
+        (("jugle",), "unknown scenario 'jugle'"),
+        (("--target", "pentium", "--out", tmp_path), "unknown target 'pentium'"),
+        (("--target", "generic"), "--target and --out: give both"),
+        (("--out", tmp_path), "--target and --out: give both"),
+    ):
+        assert reason in airhockey("precompile", *words, ok=False).stderr
 
 
 def test_a_new_scenario_and_a_new_driver_run(tmp_path):

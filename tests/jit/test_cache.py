@@ -54,10 +54,10 @@ def test_two_processes_on_an_empty_cache_compile_once(tmp_path):
     assert run(LOOP, tmp_path) == ("[1.0, 3.0, 5.0]", "")
 
 
-@pytest.mark.parametrize(("kind", "damage"), [("nbi", b""), ("nbc", b"not a pickle")])
-def test_a_damaged_file_is_compiled_again_with_one_line(tmp_path, kind, damage):
+@pytest.mark.parametrize("damage", [b"", b"not a pickle"])
+def test_a_damaged_file_is_compiled_again_with_one_line(tmp_path, damage):
     run(LOOP, tmp_path)
-    (path,) = tmp_path.rglob(f"loop_*.{kind}")
+    (path,) = tmp_path.rglob("loop_*.code")
     path.write_bytes(damage)
     out, err = run(LOOP, tmp_path)
     assert out == "[1.0, 3.0, 5.0]"
@@ -102,6 +102,20 @@ def test_a_cache_that_is_deleted_meanwhile_is_made_again(tmp_path):
     out, err = run(program, cache)
     assert out.splitlines()[-1] == "[5.0, 9.0, 13.0]"
     assert "Error" not in err
+
+
+def test_code_that_nobody_uses_is_deleted_when_something_is_compiled(tmp_path):
+    run(LOOP, tmp_path)
+    (used,) = tmp_path.rglob("loop_*.code")
+    old = used.with_name("core.laws.old-0123.code")
+    old.write_bytes(b"")
+    for path in (used, old):
+        os.utime(path, (0, 0))
+    run(LOOP, tmp_path)
+    assert used.stat().st_mtime > 0, "what is loaded is in use"
+    run(LOOP.replace("1.0", "3.0"), tmp_path)
+    assert used.exists()
+    assert not old.exists()
 
 
 @pytest.mark.parametrize("numba_folder", [False, True])

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.lab import LabClient, port_file
 
 OPEN = """
@@ -51,6 +51,7 @@ def _own_port_file(monkeypatch, tmp_path):
     cache_folder.cache_clear()
 
 
+@pytest.mark.slow
 def test_kill_9_of_its_opener_ends_the_lab():
     for _ in range(2):  # The second starts beside the first's old port file.
         opener = subprocess.Popen([sys.executable, "-c", OPEN])

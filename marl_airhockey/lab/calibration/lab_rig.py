@@ -25,7 +25,7 @@ from marl_airhockey.devices.vision.calibration import (
     tag_corners,
     view_from_tags,
 )
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.camera import PADDLE_TOP
 from marl_airhockey.lab.hand_camera import FIELD, hand_tag_places, hand_view
 from marl_airhockey.lab.lab import Lab, LabClient, served

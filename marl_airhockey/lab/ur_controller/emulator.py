@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.jit.cache import cache_folder
+from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.door import open_door
 from marl_airhockey.lab.ur_controller.controller import VERSION, Controller
 from marl_airhockey.lab.ur_controller.faults import FAULTS

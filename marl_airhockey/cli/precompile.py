@@ -1,0 +1,125 @@
+"""Command ``airhockey precompile``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from marl_airhockey.cli.options import Backend
+from marl_airhockey.cli.progress import bar
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.evaluation.as_trained import as_trained
+from marl_airhockey.jit import shipped
+from marl_airhockey.jit.cache import used
+from marl_airhockey.registry import (
+    DEFAULT_BACKEND,
+    agent_class,
+    find_scenario,
+    make_agent,
+    program_names,
+    scenario_names,
+    zoo_names,
+)
+from marl_airhockey.world.build import Keywords, compile_world
+
+
+def precompile(
+    scenarios: Annotated[
+        list[str] | None, typer.Argument(help="Scenarios; all if none are given.")
+    ] = None,
+    backend: Backend = DEFAULT_BACKEND,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(help="ideal (the default), ur5e or gantry; may be repeated."),
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            help=f"Level of processors to compile for: {', '.join(shipped.LEVELS)}. "
+            "The processor of this machine if it is not given."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for the code of a target.")
+    ] = None,
+    jobs: Annotated[
+        int, typer.Option(help="Number of processes that compile.", min=1)
+    ] = os.cpu_count() or 1,
+) -> None:
+    """Compile scenarios now, so that no first start has to compile them later."""
+    if target is not None and target not in shipped.LEVELS:
+        raise ValueError(unknown_name("target", target, list(shipped.LEVELS)))
+    if (target is None) != (out is None):
+        raise ValueError("--target and --out: give both, or none for this machine")
+    names = scenarios or scenario_names()
+    seats = {name: len(find_scenario(name).scene.seats) for name in names}
+    # Those with many seats take longest and begin first.
+    names = sorted(seats, key=lambda name: -seats[name])
+    profiles = profile or ["ideal"]
+    work = [(n, Keywords(backend=backend, profile=p)) for n in names for p in profiles]
+    if target is None or out is None:
+        with _variables({shipped.VARIABLE: "0"}):
+            _compile_all(work, jobs)
+        return
+    work += [] if scenarios else list(_drivers())
+    given = {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
+    with _variables({shipped.VARIABLE: "0", **given}):
+        paths = _compile_all(work, jobs)
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir(parents=True)
+    for path in paths:
+        shutil.copy(path, out)
+    shipped.write_manifest(out, target)
+
+
+def _drivers() -> Iterator[tuple[str, Keywords]]:
+    """Yield what drivers and policies of ours play, with the drivers."""
+    for name in program_names():
+        if agent_class(name).needs_goal:
+            yield "reach", Keywords(drivers={"paddle_0": name})
+        else:
+            yield "duel", Keywords(drivers={"paddle_0": name, "paddle_1": name})
+    for name in zoo_names():
+        scenario, keywords = as_trained({name: make_agent(name)}, None, {})
+        drivers = {**keywords.get("drivers", {}), "paddle_0": name}
+        yield str(scenario), {**keywords, "drivers": drivers}
+
+
+@contextmanager
+def _variables(values: dict[str, str]) -> Iterator[None]:
+    """Set variables of the environment of the processes that are started."""
+    before = dict(os.environ)
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+
+
+def _compile_all(work: list[tuple[str, Keywords]], jobs: int) -> set[Path]:
+    """Compile worlds in processes; return the files of their code."""
+    paths: set[Path] = set()
+    with (
+        bar() as progress,
+        ProcessPoolExecutor(min(jobs, len(work)), get_context("spawn")) as pool,
+    ):
+        task = progress.add_task("compiling", total=len(work), note="")
+        for done in as_completed(pool.submit(_compile, *one) for one in work):
+            name, found = done.result()
+            paths |= found
+            progress.update(task, note=name, advance=1)
+    return paths
+
+
+def _compile(name: str, keywords: Keywords) -> tuple[str, set[Path]]:
+    compile_world(name, keywords)
+    return name, used
