@@ -1,15 +1,20 @@
 .DEFAULT_GOAL := help
-.PHONY: help setup demo check ci test test-one test-all test-distributed lint docs clean
+.PHONY: help setup demo check ci test test-short test-realtime test-one test-all test-distributed lint docs wheel clean
 
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 FAR := .venv-distributed
 JOBS ?= 2
+PIP := $(BIN)/pip install --quiet --constraint constraints.txt
+COMPILED := juggle
+TARGET ?= x86-64-v3
+# Where it is set, every process of the tests would compile all modules again.
+export PYTHONDONTWRITEBYTECODE :=
 # The virtual lab runs in real time: nothing runs beside its tests. What the workers
 # would all compile is compiled before they start.
 REALTIME := tests/lab
-TEST = $(BIN)/airhockey warm --jobs $(JOBS) && $(BIN)/pytest -n $(JOBS) --ignore=$(REALTIME)
+TEST = $(BIN)/airhockey precompile --jobs $(JOBS) && $(BIN)/pytest -n $(JOBS) --ignore=$(REALTIME)
 
 help: ## Show what there is to make
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/\1|\2/' | \
@@ -17,25 +22,33 @@ help: ## Show what there is to make
 
 setup: $(READY) ## Set up .venv with all that demo and tests need
 
-# torch comes first and by itself: pip then takes a CPU build where there is one.
+# Scenarios are compiled while pip downloads the rest.
+# torch comes by itself: pip then takes a CPU build where there is one.
 # robosuite comes without what it names: that is numpy 1, a second OpenCV and a compiler.
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --constraint constraints.txt torch
-	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[train,play,hardware,offline,ecosystem,dev]'
-	$(BIN)/pip install --quiet --constraint constraints.txt --no-deps robosuite
+	$(PIP) --editable .
+	{ PYTHONPATH=. $(BIN)/airhockey precompile --jobs 1 $(COMPILED) 2> .venv/precompile.log; } & \
+	$(PIP) torch && \
+	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,dev]' && \
+	$(PIP) --no-deps robosuite && $(PIP) mujoco scipy termcolor tqdm && wait
 	@echo "what pip says of robosuite above does no harm: it comes without what it names"
-	$(BIN)/pip install --quiet --constraint constraints.txt mujoco scipy termcolor tqdm
 	touch $@
 
 demo: setup ## Train a paddle to juggle and show it (a minute)
 	$(BIN)/airhockey demo
 
-test: setup lint ## Run linters, types and the tests that are not slow
+.NOTPARALLEL:
+
+test: lint test-short test-realtime ## Run linters, types and the tests that are not slow
+
+test-short: setup
 	$(TEST) -m 'not slow'
-	$(BIN)/pytest -m 'not slow' $(REALTIME)
+
+test-realtime: setup
+	$(BIN)/pytest -m 'not slow' --closing $(REALTIME)
 
 check: setup ## Run linters and tests of what has changed since main
 	$(BIN)/python scripts/check_changes.py
@@ -47,21 +60,25 @@ ci: ## Run what CI runs, on a clean clone of the last commit
 test-one: setup ## Run the tests of one scenario or driver: make test-one NAME=my_task
 	$(BIN)/pytest tests/suites -m 'not slow' --only $(NAME)
 
-test-all: setup lint ## Run every test
+test-all: setup lint $(FAR)/.ready ## Run every test
 	$(TEST)
-	$(BIN)/pytest $(REALTIME)
+	$(BIN)/pytest --closing $(REALTIME)
+	$(RLLIB)
 
-# RLlib pins an older gymnasium, so it has an environment of its own.
-$(FAR)/.ready: pyproject.toml constraints.txt
+# RLlib pins an older gymnasium, so it has an environment of its own, which takes all
+# else from .venv.
+$(FAR)/.ready: $(READY)
 	$(PYTHON) -m venv $(FAR)
 	sed '/^gymnasium==/d' constraints.txt > $(FAR)/constraints.txt
-	$(FAR)/bin/pip install --quiet --upgrade pip
-	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt torch
-	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt --editable '.[train,distributed]' pytest pytest-timeout pytest-xdist
+	$(BIN)/python -c 'import os, sysconfig; print(os.getcwd(), sysconfig.get_path("purelib"), sep="\n")' \
+		> $$($(FAR)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/shared.pth
+	$(FAR)/bin/pip install --quiet --constraint $(FAR)/constraints.txt 'marl_airhockey[distributed]'
 	touch $@
 
-test-distributed: $(FAR)/.ready ## Run the tests of RLlib, in an environment of their own
-	$(FAR)/bin/pytest -W ignore tests/learn/test_rllib.py
+RLLIB = $(FAR)/bin/python -m pytest -W ignore tests/learn/test_rllib.py
+
+test-distributed: $(FAR)/.ready ## Run the short test of RLlib, in an environment of its own
+	$(RLLIB) -m 'not slow'
 
 lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
@@ -69,6 +86,11 @@ lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios agents scripts tests
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy
+
+wheel: setup ## Build a wheel into dist/ that starts without compiling (TARGET=generic: any processor)
+	rm -rf dist build
+	$(BIN)/airhockey precompile --target $(TARGET) --out build/precompiled --profile ideal --profile ur5e
+	$(BIN)/python -m build --wheel --outdir dist .
 
 docs: setup ## Build the documentation into site/
 	$(BIN)/mkdocs build --strict

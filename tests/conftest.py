@@ -5,6 +5,7 @@ import shutil
 from itertools import product
 from typing import ClassVar
 
+import costs
 import pytest
 from names import GOALS, ideal_backends, seats
 from xdist.scheduler import LoadScopeScheduling
@@ -22,6 +23,17 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 def pytest_addoption(parser):
     parser.addoption("--only", help="Run the tests of this scenario or driver alone.")
     parser.addoption("--shuffle", type=int, help="Run in a random order, by a seed.")
+    parser.addoption("--costs", help="File for the CPU-seconds of every test.")
+    parser.addoption(
+        "--closing", action="store_true", help="Sum up the run before this one, too."
+    )
+
+
+def pytest_configure(config):
+    """Measure tests where they run, and sum up where they are reported."""
+    config.pluginmanager.register(costs.Measure())
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(costs.Summary(config))
 
 
 def pytest_collection_modifyitems(config, items):

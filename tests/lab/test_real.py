@@ -66,7 +66,7 @@ def test_a_reach_beyond_the_joints_is_refused_before_anything_moves(rig, tmp_pat
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("protective_stop", "protective stop"),
+        pytest.param("protective_stop", "protective stop", marks=pytest.mark.slow),
         ("frozen_camera", "no frame"),
         pytest.param("silent_robot", "robot silent", marks=pytest.mark.slow),
         pytest.param("lost_puck", "not seen", marks=pytest.mark.slow),
@@ -129,6 +129,7 @@ def test_what_is_wrong_with_the_picture_is_noticed_first(rig, fault, name, words
         ah.parallel_env("juggle", **keywords(rig))
 
 
+@pytest.mark.slow
 def test_delayed_frames_are_older_and_played_with(rig, fault):
     fault("delayed_frames")
     time.sleep(0.5)

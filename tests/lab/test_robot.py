@@ -62,6 +62,7 @@ def paddle_speed(lab):
     return np.linalg.norm(lab.ask({"do": "truth"})["paddle"][3:5])
 
 
+@pytest.mark.slow
 def test_wild_commands_trip_nothing(lab, robot):
     rng, places = np.random.default_rng(0), []
     for k in range(60):
@@ -104,6 +105,7 @@ def test_a_protective_stop_is_released_by_word_alone(lab, robot, fault):
     robot.go_to(lab.setup.home)
 
 
+@pytest.mark.slow
 def test_an_emergency_stop_is_never_released(lab, robot, fault):
     drive(robot)
     fault("emergency_stop")
@@ -159,6 +161,7 @@ def test_a_driver_that_is_killed_leaves_the_arm_at_rest(lab, robot):
     assert wait_for(lambda: not robot.is_connected)
 
 
+@pytest.mark.slow
 def test_a_caller_that_is_killed_leaves_nothing_behind(lab, tmp_path):
     code = tmp_path / "caller.py"
     code.write_text(

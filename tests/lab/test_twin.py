@@ -12,6 +12,7 @@ from marl_airhockey.registry import make_agent
 TWIN = f"ur5e:host={ADDRESS},policy=zoo/reach_ur5e"
 
 
+@pytest.mark.slow
 def test_the_arm_does_what_the_policy_says_and_the_paddle_follows_it():
     pytest.importorskip("rtde_control")
     with emulator():

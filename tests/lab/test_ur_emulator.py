@@ -62,6 +62,7 @@ def test_a_client_moves_the_arm_and_meets_faults_on_demand():
         receive.disconnect()
 
 
+@pytest.mark.slow
 def test_every_emulated_call_of_the_control_client_answers():
     with emulator():
         control = rtde_control.RTDEControlInterface(ADDRESS, 500.0)
@@ -102,6 +103,7 @@ def test_every_emulated_call_of_the_control_client_answers():
         receive.disconnect()
 
 
+@pytest.mark.slow
 def test_the_speed_slider_slows_motion_and_outputs_are_read_back():
     with emulator():
         receive = rtde_receive.RTDEReceiveInterface(ADDRESS, 125.0)
@@ -141,6 +143,7 @@ def test_the_dashboard_looks_after_the_robot():
         board.disconnect()
 
 
+@pytest.mark.slow
 def test_external_control_gets_its_script_from_the_client():
     """The constructor's arguments are those of the authors' own robot code."""
     assert until(external_control_is_free, 30.0)
@@ -173,6 +176,7 @@ def test_the_upper_range_of_registers_works_too():
         control.disconnect()
 
 
+@pytest.mark.slow
 def test_two_robots_run_side_by_side():
     with emulator(), emulator(at=OTHER):
         clients = [
@@ -235,6 +239,7 @@ def test_the_status_names_safety_program_and_commands():
         assert "stopped" in shown
 
 
+@pytest.mark.slow
 def test_a_scheduled_fault_comes_and_goes():
     with emulator("--fault", "protective_stop@1.5s-2.5s"):
         receive = rtde_receive.RTDEReceiveInterface(ADDRESS, 125.0)

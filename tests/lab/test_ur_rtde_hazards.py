@@ -88,6 +88,7 @@ def test_an_arm_that_hears_nothing_stops_and_its_program_ends(arm):
     assert arm.read().fault is ArmFault.PROGRAM_LOST
 
 
+@pytest.mark.slow
 def test_a_command_after_the_force_mode_does_not_replace_it(arm):
     """3: of two commands in one period of the controller the first is lost."""
 
@@ -101,6 +102,7 @@ def test_a_command_after_the_force_mode_does_not_replace_it(arm):
         assert until(lambda count=before: pressed() > count, 1.0)
 
 
+@pytest.mark.slow
 def test_the_last_command_is_not_run_again_after_a_restart(arm):
     """4: registers keep their values, so that a new program runs the old command."""
     assert servo(arm, 0.3, speed=0.2)
@@ -117,6 +119,7 @@ def test_the_last_command_is_not_run_again_after_a_restart(arm):
     assert status()["commands"][SERVO] == counted
 
 
+@pytest.mark.slow
 def test_a_silent_robot_is_a_fault_although_the_client_says_nothing(robot):
     """5: isConnected() and servoL() are True for seconds after it went silent."""
     drive(robot, 0.3)
@@ -126,6 +129,7 @@ def test_a_silent_robot_is_a_fault_although_the_client_says_nothing(robot):
     switch("silent_robot", "--off", "--address", ADDRESS)
 
 
+@pytest.mark.slow
 def test_a_lost_connection_gets_a_new_process(robot):
     """6 and 12: the client reconnects for ever, and returns its last values."""
     drive(robot, 0.3)
@@ -144,6 +148,7 @@ def test_a_lost_connection_gets_a_new_process(robot):
     robot.go_to(SETUP.home)
 
 
+@pytest.mark.slow
 def test_the_caller_runs_while_the_driver_connects(running):
     """7: constructors hold Python's lock, so the driver has a process of its own."""
     gaps, ended = [], threading.Event()
@@ -188,6 +193,7 @@ def test_a_halt_uses_neither_stop_l_nor_stop_j(arm):
     assert not {STOP_LINE, STOP_JOINTS} & status()["commands"].keys()
 
 
+@pytest.mark.slow
 def test_the_reason_of_a_stop_is_named_although_it_comes_late(robot):
     """10: servoL fails before the other stream says why."""
     drive(robot, 0.3)
@@ -199,6 +205,7 @@ def test_the_reason_of_a_stop_is_named_although_it_comes_late(robot):
     assert Fault.PROTECTIVE_STOP in reasons
 
 
+@pytest.mark.slow
 def test_a_stop_is_not_released_before_five_seconds(robot):
     """11: nor ever without a person's word."""
     switch("protective_stop", "--address", ADDRESS)
@@ -228,6 +235,7 @@ def test_a_controller_that_cannot_be_used_is_refused(words, fault, reason):
         assert status()["program"] == "stopped"
 
 
+@pytest.mark.slow
 def test_an_arm_at_another_table_is_refused_and_does_not_move(running):
     before = status()["pose"]
     far = ((-0.8, 0.1), (-0.6, 0.1), (-0.6, 0.3), (-0.8, 0.3))

@@ -95,10 +95,16 @@ def test_a_share_is_that_of_the_best_episodes(mixed):
     assert config.data == [str(path) for path in files]
 
 
-@pytest.mark.parametrize("algo", ALGORITHMS)
+LONG = ("td3_bc", "rebrac")
+"""Algorithms whose critics need 6000 steps"""
+
+
+@pytest.mark.parametrize(
+    "algo",
+    [pytest.param(a, marks=pytest.mark.slow if a in LONG else ()) for a in ALGORITHMS],
+)
 def test_what_an_expert_did_is_learned(algo, expert, tmp_path):
-    more = {"td3_bc": 6000, "rebrac": 6000}
-    steps = more.get(algo, SMALL["total_steps"])
+    steps = 6000 if algo in LONG else SMALL["total_steps"]
     config = offline_config(algo, [expert], SMALL | {"total_steps": steps})
     assert config.scenario == "reach"
     row = run_training(config, tmp_path / "run")

@@ -55,6 +55,7 @@ def test_it_learns_and_its_policy_drives_without_ray(tmp_path):
     assert "engine" in exported.card["command"]
 
 
+@pytest.mark.slow
 def test_self_play_goes_on_when_a_runner_is_killed(tmp_path):
     from marl_airhockey.learn.rllib import build_algorithm, start_ray
 
@@ -78,6 +79,7 @@ def test_self_play_goes_on_when_a_runner_is_killed(tmp_path):
     algo.stop()
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_where_it_stood(tmp_path):
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "marl_airhockey.cli", "train", "touch"]
@@ -102,6 +104,7 @@ def test_a_killed_run_goes_on_where_it_stood(tmp_path):
     assert len(list(folder.glob("rllib-*"))) == 1
 
 
+@pytest.mark.slow
 def test_the_tutorial_runs():
     out = run("tutorials/with_rllib.py", "--iterations", "1", "--steps", "1000")
     assert "p0 as a driver scores" in out

@@ -90,7 +90,7 @@ def test_a_finished_run_is_not_overwritten(touch_run):
 def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
     folder = tmp_path / "killed"
     command = [sys.executable, "-m", "marl_airhockey.cli", "train", "touch"]
-    command += ["--out", str(folder), "--steps", "60000", "--set", "num_worlds=32"]
+    command += ["--out", str(folder), "--steps", "24000", "--set", "num_worlds=32"]
     command += ["--engine", engine]
     for setting in ("batch_size=256", "evaluations=8", "eval_episodes=2"):
         command += ["--set", setting]
@@ -102,13 +102,13 @@ def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     stood = json.loads(state.read_text())["steps"]
-    assert 0 < stood < 60_000
+    assert 0 < stood < 24_000
     again = ["--resume", str(folder), "--json"]
     out = subprocess.run(
         [*command[:4], *again], capture_output=True, text=True, check=True
     )
     last = json.loads(out.stdout)
-    assert last["steps"] >= 60_000
+    assert last["steps"] >= 24_000
     steps = [int(row["steps"]) for row in rows(folder)]
     assert steps == sorted(steps)
     assert stood in steps

@@ -48,6 +48,7 @@ def gone(connection):
         return True
 
 
+@pytest.mark.slow
 def test_half_open_connections_keep_nobody_out(address):
     async def play():
         url = address.replace("http", "ws") + "ws"

@@ -2,6 +2,7 @@
 
 import time
 
+import pytest
 from pages import page_at, running, served, state_of, wait
 from study_steps import plan_writer
 
@@ -98,6 +99,7 @@ def test_a_recording_is_watched_in_the_page(browser, tmp_path):
     assert not complaints
 
 
+@pytest.mark.slow
 def test_a_participant_in_the_browser(browser, tmp_path):
     plan_writer(tmp_path)()
     complaints = []

@@ -11,6 +11,7 @@ HEADLINE = "document.querySelector('#headline').innerText"
 DETAIL = "document.querySelector('#detail').innerText"
 
 
+@pytest.mark.slow
 def test_who_remains_is_offered_ways_on(browser):
     complaints = []
     with served("duel", "--driver", "paddle_1=person") as (address, _):
@@ -34,6 +35,7 @@ def test_who_remains_is_offered_ways_on(browser):
     assert not complaints
 
 
+@pytest.mark.slow
 def test_a_level_game_is_explained_and_a_golden_goal_offered(browser):
     complaints = []
     options = ("--option", "seconds=1", "--opponent", "goalkeeper")

@@ -3,6 +3,7 @@
 import asyncio
 import json
 
+import pytest
 import websockets
 from pages import line, running
 from study_steps import PLAN
@@ -32,6 +33,7 @@ async def _take_part(url):
                 return data["n"]
 
 
+@pytest.mark.slow
 def test_killed_study_loses_less_than_a_second_of_a_game(tmp_path):
     plan, out = tmp_path / "plan.toml", tmp_path / "out"
     plan.write_text(PLAN.replace("seconds = 1.0", "seconds = 60.0"))

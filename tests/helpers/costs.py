@@ -1,0 +1,152 @@
+"""CPU-seconds of every test: what the short run may cost, and its closing line.
+
+A test of the short run above `MOST` CPU-seconds fails the run, unless `EXPENSIVE` gives
+a reason. What numba compiles is left out, as it happens once per machine. Fixtures that
+tests share are counted by themselves. Time on the clock is never judged.
+"""
+
+import json
+import resource
+import time
+from collections import Counter
+
+import pytest
+from numba.core import event
+
+MOST = 8.0
+"""CPU-seconds of a test without the mark `slow`"""
+ENOUGH = 3.0
+"""CPU-seconds below which a test of `EXPENSIVE` needs no reason"""
+EXPENSIVE = {
+    "tests/learn/test_rllib.py::test_it_learns_and_its_policy_drives_without_ray": (
+        "Ray starts processes of its own"
+    ),
+}
+"""Reasons of tests, by their ids, that cost more and belong to the short run"""
+FORMER = "marl_airhockey/costs"
+"""Where the cache of pytest keeps the costs of the first half of `make test`"""
+
+
+def cpu_seconds():
+    """Return the CPU-seconds of this process and of its ended children."""
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
+
+
+class Clock(event.Listener):
+    """CPU-seconds of this process without those of numba's compiler."""
+
+    def __init__(self):
+        self._compiled, self._depth, self._began = 0.0, 0, 0.0
+
+    def on_start(self, event):
+        """Note that a function begins to be compiled; some of them nest."""
+        if not self._depth:
+            self._began = time.thread_time()
+        self._depth += 1
+
+    def on_end(self, event):
+        """Note that a function has been compiled."""
+        self._depth -= 1
+        if not self._depth:
+            self._compiled += time.thread_time() - self._began
+
+    def now(self):
+        """Return CPU-seconds so far."""
+        return cpu_seconds() - self._compiled
+
+
+class Measure:
+    """Plugin of each worker: writes the cost of a phase into its report."""
+
+    def __init__(self):
+        self._clock, self._last, self._shared = Clock(), 0.0, []
+        event.register("numba:compile", self._clock)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self, fixturedef, request):
+        before, inside = self._clock.now(), sum(cost for _, cost in self._shared)
+        result = yield
+        if fixturedef.scope != "function":
+            other = sum(cost for _, cost in self._shared) - inside
+            cost = self._clock.now() - before - other
+            self._shared.append((f"fixture {fixturedef.argname}", cost))
+        return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item):
+        self._last = self._clock.now()
+        return (yield)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item):
+        report, now = (yield), self._clock.now()
+        shared, self._shared = self._shared, []
+        cost = now - self._last - sum(cost for _, cost in shared)
+        report.costs = [(item.nodeid, cost), *shared]
+        report.slow = item.get_closest_marker("slow") is not None
+        self._last = now
+        return report
+
+
+class Summary:
+    """Plugin of the process that reports: sums costs up and judges them."""
+
+    def __init__(self, config):
+        self._config, self._began = config, time.monotonic()
+        self._costs, self._slow, self._failed = Counter(), set(), set()
+
+    def pytest_runtest_logreport(self, report):
+        """Add the cost of a phase; teardowns of shared fixtures belong to no test."""
+        for name, cost in getattr(report, "costs", ()):
+            if report.when != "teardown":
+                self._costs[name] += cost
+        if getattr(report, "slow", False):
+            self._slow.add(report.nodeid)
+        if report.failed:
+            self._failed.add(report.nodeid)
+
+    def faults(self):
+        """Return what is wrong with the costs of the tests that passed."""
+        for name, cost in self._costs.items():
+            if name in self._slow | self._failed:
+                continue
+            if cost > MOST and name not in EXPENSIVE:
+                yield (
+                    f"{name} costs {cost:.1f} CPU-s of {MOST:.0f}: make it cheaper, "
+                    "mark it slow, or give a reason in EXPENSIVE (helpers/costs.py)"
+                )
+            if cost < ENOUGH and name in EXPENSIVE:
+                yield f"{name} costs {cost:.1f} CPU-s: EXPENSIVE need not name it"
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_sessionfinish(self, session):
+        """Fail the run if a test costs too much."""
+        if not session.exitstatus and any(self.faults()):
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter):
+        """Write what is wrong, and tests, seconds and the five slowest."""
+        for fault in self.faults():
+            terminalreporter.write_line(f"FAILED {fault}", red=True)
+        tests = len([name for name in self._costs if "::" in name])
+        seconds, costs = time.monotonic() - self._began, self._costs
+        cache = self._config.cache
+        if self._config.getoption("--closing"):
+            before = cache.get(FORMER, {"tests": 0, "seconds": 0.0, "costs": {}})
+            tests, seconds = tests + before["tests"], seconds + before["seconds"]
+            costs = costs + Counter(before["costs"])
+        else:
+            known = dict(costs.most_common(5))
+            cache.set(FORMER, {"tests": tests, "seconds": seconds, "costs": known})
+        slowest = ", ".join(
+            f"{name.removeprefix('tests/')} {cost:.1f}"
+            for name, cost in costs.most_common(5)
+        )
+        terminalreporter.write_line(
+            f"{tests} tests in {seconds:.0f} s; CPU-seconds of the slowest: {slowest}"
+        )
+        if path := self._config.getoption("--costs"):
+            with open(path, "w") as file:
+                json.dump(dict(self._costs.most_common()), file, indent=1)
