@@ -4,6 +4,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+TRAINS := .venv/.trains
 FAR := .venv-distributed
 JOBS ?= 2
 PIP := $(BIN)/pip install --quiet --constraint constraints.txt
@@ -22,22 +23,26 @@ help: ## Show what there is to make
 
 setup: $(READY) ## Set up .venv with all that demo and tests need
 
-# Scenarios are compiled while pip downloads the rest.
+# What demo needs. Its scenario is compiled while pip downloads the rest.
 # torch comes by itself: pip then takes a CPU build where there is one.
-# robosuite comes without what it names: that is numpy 1, a second OpenCV and a compiler.
-$(READY): pyproject.toml constraints.txt
+$(TRAINS): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --upgrade pip
 	$(PIP) --editable .
 	{ PYTHONPATH=. $(BIN)/airhockey precompile --jobs 1 $(COMPILED) 2> .venv/precompile.log; } & \
-	$(PIP) torch && \
-	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,dev]' && \
-	$(PIP) --no-deps robosuite && $(PIP) mujoco scipy termcolor tqdm && wait
+	$(PIP) torch && $(PIP) 'marl_airhockey[train]' && wait
+	touch $@
+
+# robosuite comes without what it names: that is numpy 1, a second OpenCV and a compiler.
+$(READY): $(TRAINS)
+	$(PIP) 'marl_airhockey[train,play,hardware,offline,ecosystem,dev]'
+	$(PIP) --no-deps robosuite
+	$(PIP) mujoco scipy termcolor tqdm
 	@echo "what pip says of robosuite above does no harm: it comes without what it names"
 	touch $@
 
-demo: setup ## Train a paddle to juggle and show it (a minute)
+demo: $(TRAINS) ## Train a paddle to juggle and show it (a minute)
 	$(BIN)/airhockey demo
 
 .NOTPARALLEL:
@@ -80,6 +85,8 @@ RLLIB = $(FAR)/bin/python -m pytest -W ignore tests/learn/test_rllib.py
 test-distributed: $(FAR)/.ready ## Run the short test of RLlib, in an environment of its own
 	$(RLLIB) -m 'not slow'
 
+# Types of a clone are checked as far as those of another one were.
+lint: export MYPY_CACHE_DIR := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/marl_airhockey/mypy
 lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .

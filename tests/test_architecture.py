@@ -1,6 +1,7 @@
 """Rules of the code that no linter knows; `lint-imports` keeps the layers."""
 
 import ast
+import importlib.util
 import re
 import subprocess
 import sys
@@ -102,6 +103,17 @@ def test_names_use_standard_words():
         if PRIVATE_WORDS & set(re.split("_+", name.lower()))
     ]
     assert not found
+
+
+def test_every_fault_of_check_mutations_can_be_made():
+    path = PACKAGE.parent / "scripts" / "check_mutations.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert len(script.FAULTS) > 20
+    assert script.faults_of(script.FAULTS) == []
+    gone = script.FAULTS[0]._replace(old="no such text", tests="no_such_test.py")
+    assert len(script.faults_of([gone])) == 2
 
 
 def test_files_are_short_or_have_a_reason():

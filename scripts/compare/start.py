@@ -1,10 +1,10 @@
-"""Compare the cost of the first start of this tree with that of another checkout.
+"""Compare the cost of the first start of this checkout with that of another place.
 
     python scripts/compare/start.py CHECKOUT
+    python scripts/compare/start.py PYTHON     # of an environment that has a wheel
 
 The processes of a case begin together with an empty cache of compiled code, or with one
-that another scenario has filled, and take a step of one world; printed are the
-CPU-seconds of all of them and the memory of the largest, the trees one after the other.
+that another scenario has filled, and take a step of one world.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -52,17 +53,31 @@ world.step(np.zeros((1, len(world.open), 2)))
 """
 
 
-def start(tree: Path, case: str) -> tuple[float, float]:
-    """Start a case; return CPU-seconds and GB of memory."""
+class Cost(NamedTuple):
+    """Cost of the processes of a case."""
+
+    seconds: float
+    """Time until the last one has ended, s"""
+    cpu_seconds: float
+    """CPU-seconds of all"""
+    memory: float
+    """Memory of the largest, GB"""
+
+
+def start(place: Path, case: str) -> Cost:
+    """Start a case by an interpreter, or by this one in a checkout; return the cost."""
     if case not in CASES:
         raise typer.BadParameter(f"no case {case!r}; there are {'; '.join(CASES)}")
     scenario, options, processes, after = CASES[case]
+    python = str(place) if place.is_file() else sys.executable
     with tempfile.TemporaryDirectory() as folder:
-        where = {"PYTHONPATH": str(tree), "MARL_AIRHOCKEY_CACHE": folder}
+        where = {"MARL_AIRHOCKEY_CACHE": folder}
+        if place.is_dir():
+            where["PYTHONPATH"] = str(place)
 
         def begin(name: str, options: dict[str, Any]) -> subprocess.Popen[bytes]:
             return subprocess.Popen(
-                [sys.executable, "-c", START, name, json.dumps(options)],
+                [python, "-c", START, name, json.dumps(options)],
                 env={**os.environ, **where},
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
@@ -70,28 +85,44 @@ def start(tree: Path, case: str) -> tuple[float, float]:
 
         if after:
             begin(after, {}).wait()
+        began = time.monotonic()
         children = [begin(scenario, options) for _ in range(processes)]
         used = [os.wait4(child.pid, 0) for child in children]
+        seconds = time.monotonic() - began
     if any(status for _, status, _ in used):
-        raise typer.BadParameter(f"{case} does not start in {tree}")
-    seconds = sum(usage.ru_utime + usage.ru_stime for *_, usage in used)
-    return seconds, max(usage.ru_maxrss for *_, usage in used) / 2**20
+        raise typer.BadParameter(f"{case} does not start with {place}")
+    cpu = sum(usage.ru_utime + usage.ru_stime for *_, usage in used)
+    return Cost(seconds, cpu, max(usage.ru_maxrss for *_, usage in used) / 2**20)
 
 
 def main(
-    checkout: Path,
+    other: Path,
     cases: Annotated[str, typer.Option(help="Separated by semicolons.")] = "; ".join(
         CASES
     ),
+    out: Annotated[Path | None, typer.Option(help="CSV file for the rows.")] = None,
 ) -> None:
-    """Start both trees with empty caches and print what that costs."""
-    table = Table("CPU-s and GB of a first start", "here", "there", "here / there")
-    trees = Path(__file__).resolve().parents[2], checkout.resolve()
+    """Start this checkout and another place with empty caches; print the costs."""
+    table = Table("first start: s, CPU-s, GB", "here", "there", "here / there")
+    here = Path(__file__).resolve().parents[2]
+    # An interpreter of an environment is a link that must not be resolved.
+    places = {"here": here, "there": other.absolute()}
+    rows = ["case,place,seconds,cpu_seconds,memory_gb"]
     for case in cases.split("; "):
-        here, there = (start(tree, case) for tree in trees)
-        costs = [f"{seconds:.0f}, {memory:.2f}" for seconds, memory in (here, there)]
-        table.add_row(case, *costs, f"{here[0] / there[0]:.2f}")
+        costs = {name: start(place, case) for name, place in places.items()}
+        rows += [
+            f'"{case}",{name},{c.seconds:.2f},{c.cpu_seconds:.2f},{c.memory:.2f}'
+            for name, c in costs.items()
+        ]
+        texts = [
+            f"{c.seconds:.1f}, {c.cpu_seconds:.1f}, {c.memory:.2f}"
+            for c in costs.values()
+        ]
+        ratio = costs["here"].cpu_seconds / costs["there"].cpu_seconds
+        table.add_row(case, *texts, f"{ratio:.2f}")
     Console(width=100).print(table)
+    if out is not None:
+        out.write_text("\n".join(rows) + "\n")
 
 
 if __name__ == "__main__":

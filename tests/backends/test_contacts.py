@@ -20,7 +20,7 @@ def cornered(world, seed=0):
     corners = np.asarray(scene.table.vertices)
     where = corners[np.arange(worlds) % len(corners)]
     state = world.state
-    near = (0.5, 0.13) if len(corners) == 3 else (0.62, 0.17)
+    near = (0.5, 0.13) if len(corners) == 3 else (0.58, 0.21)
     for k in range(scene.pucks):
         spread = rng.normal(0.0, 0.01, (worlds, 2))
         state.puck[:, k] = where * (near[0] + near[1] * k) + spread
