@@ -86,7 +86,7 @@ test-distributed: $(FAR)/.ready ## Run the short test of RLlib, in an environmen
 	$(RLLIB) -m 'not slow'
 
 # Types of a clone are checked as far as those of another one were.
-lint: export MYPY_CACHE_DIR := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/marl_airhockey/mypy
+lint check: export MYPY_CACHE_DIR := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/marl_airhockey/mypy
 lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .

@@ -67,8 +67,11 @@ def main() -> None:
     tests = {str(t.relative_to(ROOT)) for t in map(tests_of, files) if t is not None}
     # A folder holds its files.
     tests = {t for t in tests if str(Path(t).parent) not in tests}
-    if tests:
-        failed |= run(TOOLS / "pytest", "-n", "2", "-m", "not slow", *sorted(tests))
+    # Nothing runs beside the tests of the lab, which runs in real time.
+    lab = {t for t in tests if t.startswith("tests/lab")}
+    for some, workers in ((tests - lab, ("-n", "2")), (lab, ())):
+        if some:
+            failed |= run(TOOLS / "pytest", *workers, "-m", "not slow", *sorted(some))
     for path in files:
         if path.parent.name in ("scenarios", "agents") and path.suffix == ".py":
             only = "tests/suites", "-m", "not slow", "--only", path.stem

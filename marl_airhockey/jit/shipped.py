@@ -58,11 +58,14 @@ def shipped() -> Shipped:
     path = FOLDER / MANIFEST
     if os.environ.get(VARIABLE) == "0" or not path.exists():
         return Shipped(None, nothing, "")
-    manifest = json.loads(path.read_text())
-    reason = _mismatch(manifest)
+    try:
+        manifest = json.loads(path.read_text())
+        reason = _mismatch(manifest)
+        system, processor, features = manifest["target"]
+    except (OSError, ValueError, KeyError):
+        return Shipped(None, nothing, f"has a damaged {MANIFEST}")
     if reason:
         return Shipped(None, nothing, reason)
-    system, processor, features = manifest["target"]
     return Shipped(FOLDER, (system, processor, features), "")
 
 

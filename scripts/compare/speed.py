@@ -1,6 +1,7 @@
-"""Compare the speed of this tree with that of another checkout, in rounds of one run.
+"""Compare the speed of this checkout with that of another place, in rounds of one run.
 
     python scripts/compare/speed.py CHECKOUT
+    python scripts/compare/speed.py PYTHON --empty   # code that a wheel holds
 
 measures the dict environment, 4096 worlds, and 256 worlds in which every seat chases
 the puck, in steps per CPU-second of a process for each tree, with the compiled 2D
@@ -10,15 +11,15 @@ the median over the rounds, each of which measures both trees one after the othe
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
 import typer
+from places import HERE, started
 from rich.console import Console
 from rich.table import Table
 
@@ -73,11 +74,14 @@ for line in sys.stdin:
 """
 
 
-def start(stack: ExitStack, tree: Path, case: str) -> subprocess.Popen[str]:
+def start(
+    stack: ExitStack, place: Path, case: str, cache: str | None
+) -> subprocess.Popen[str]:
     """Start a process that answers each line of seconds with steps per CPU-second."""
+    python, variables = started(place, cache)
     child = subprocess.Popen(
-        [sys.executable, "-c", MEASURE, *case.split()],
-        env={**os.environ, "PYTHONPATH": str(tree)},
+        [python, "-c", MEASURE, *case.split()],
+        env=variables,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -95,17 +99,26 @@ def ask(child: subprocess.Popen[str], seconds: float) -> float:
 
 
 def main(
-    checkout: Path,
+    other: Path,
     cases: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(CASES),
     rounds: Annotated[int, typer.Option(help="Rounds.")] = 9,
     seconds: Annotated[float, typer.Option(help="CPU-seconds of a case.")] = 2.0,
+    empty: Annotated[
+        bool, typer.Option(help="Give the other place an empty cache of compiled code.")
+    ] = False,
 ) -> None:
     """Measure both trees and print their rates and ratios."""
     table = Table("steps per CPU-s", "here", "there", "here / there", "spread")
-    trees = Path(__file__).resolve().parents[2], checkout.resolve()
+    # An interpreter of an environment is a link that must not be resolved.
+    places = HERE, other.absolute()
     for case in cases.split(","):
         with ExitStack() as stack:
-            children = [start(stack, tree, case) for tree in trees]
+            folder = stack.enter_context(TemporaryDirectory()) if empty else None
+            caches = None, folder
+            children = [
+                start(stack, place, case, cache)
+                for place, cache in zip(places, caches, strict=True)
+            ]
             rates = np.array(
                 [[ask(child, seconds) for child in children] for _ in range(rounds)]
             )

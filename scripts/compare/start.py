@@ -12,13 +12,13 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import typer
+from places import HERE, started
 from rich.console import Console
 from rich.table import Table
 
@@ -69,16 +69,13 @@ def start(place: Path, case: str) -> Cost:
     if case not in CASES:
         raise typer.BadParameter(f"no case {case!r}; there are {'; '.join(CASES)}")
     scenario, options, processes, after = CASES[case]
-    python = str(place) if place.is_file() else sys.executable
     with tempfile.TemporaryDirectory() as folder:
-        where = {"MARL_AIRHOCKEY_CACHE": folder}
-        if place.is_dir():
-            where["PYTHONPATH"] = str(place)
+        python, variables = started(place, folder)
 
         def begin(name: str, options: dict[str, Any]) -> subprocess.Popen[bytes]:
             return subprocess.Popen(
                 [python, "-c", START, name, json.dumps(options)],
-                env={**os.environ, **where},
+                env=variables,
                 stderr=subprocess.DEVNULL,
                 cwd=folder,
             )
@@ -104,9 +101,8 @@ def main(
 ) -> None:
     """Start this checkout and another place with empty caches; print the costs."""
     table = Table("first start: s, CPU-s, GB", "here", "there", "here / there")
-    here = Path(__file__).resolve().parents[2]
     # An interpreter of an environment is a link that must not be resolved.
-    places = {"here": here, "there": other.absolute()}
+    places = {"here": HERE, "there": other.absolute()}
     rows = ["case,place,seconds,cpu_seconds,memory_gb"]
     for case in cases.split("; "):
         costs = {name: start(place, case) for name, place in places.items()}

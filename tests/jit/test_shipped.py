@@ -85,5 +85,12 @@ def test_a_reason_is_given_where_it_does_not_fit(package, tmp_path, change, reas
     assert f"the code that comes with the package {reason}" in err
 
 
+def test_a_damaged_manifest_is_a_reason(package, tmp_path):
+    (tmp_path / "manifest.json").write_text('{"versions": {}}')
+    out, err = run(FROM + LOOP, tmp_path / "cache", tmp_path)
+    assert out == "[1.0, 3.0, 5.0]"
+    assert "the code that comes with the package has a damaged manifest.json" in err
+
+
 def test_levels_grow():
     assert set(LEVELS["generic"]) < set(LEVELS["x86-64-v2"]) < set(LEVELS["x86-64-v3"])
