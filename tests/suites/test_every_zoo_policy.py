@@ -62,17 +62,11 @@ def test_it_is_as_good_as_its_card(name):
 
 
 @pytest.mark.parametrize(
-    "task",
-    [
-        "juggle",
-        *(
-            pytest.param(task, marks=pytest.mark.slow)
-            for task in ("reach", "reach_velocity", "touch", "puck_velocity")
-        ),
-    ],
+    "task", ["juggle", "reach", "reach_velocity", "touch", "puck_velocity"]
 )
 def test_policies_of_the_tasks_of_a_real_table_are_fit_for_a_robot(task):
-    found = ah.evaluate(f"zoo/{task}_ur5e", episodes=200)
+    # In 200 episodes chance alone moves a success of 0.955 below the bound.
+    found = ah.evaluate(f"zoo/{task}_ur5e", episodes=2000)
     assert found.deployability.grade in "AB"
     assert found.success >= 0.95
 
