@@ -1,10 +1,10 @@
 """Compiled code that comes with the package: what it is for, and whether it fits here.
 
 ``airhockey precompile --target x86-64-v3`` compiles for a level of processors instead
-of the one at hand. A wheel that holds the result starts without compiling, at 0.95 of
-the speed of code for the processor at hand. Code fits if the versions of Python, numba
-and llvmlite and the system are the same and the processor has the level's features;
-each function is found by its fingerprint, so code of other sources is never loaded.
+of the one at hand. A wheel that holds the result starts without compiling. Code fits
+if the versions of Python, numba and llvmlite and the system are the same and the
+processor has the level's features. Each function is found by its fingerprint, so code
+of other sources is never loaded.
 """
 
 from __future__ import annotations

@@ -295,6 +295,17 @@ def test_tasks_through_the_lab_are_those_of_their_rows():
             assert line[title] == row[column]
 
 
+def test_first_starts_are_those_that_were_measured():
+    found = {(row["case"], row["place"]): row for row in rows_of("first_start.csv")}
+    listed = table("docs/backends.md", "first start")
+    assert len(listed) == len(found) / 2
+    for row in listed:
+        for title, place in (("checkout", "here"), ("wheel", "there")):
+            costs = found[row["first start"], place]
+            for unit, column in (("s", "seconds"), ("CPU-s", "cpu_seconds")):
+                assert row[f"{title}, {unit}"] == f"{float(costs[column]):.1f}"
+
+
 def test_tracking_is_that_of_its_rows():
     rows = {(row["filter"], row["clock"]): row for row in rows_of("tracking.csv")}
     shown = table("docs/robot.md", "latency, ms")
