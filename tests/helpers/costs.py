@@ -9,6 +9,7 @@ import json
 import resource
 import time
 from collections import Counter
+from pathlib import Path
 
 import pytest
 from numba.core import event
@@ -95,58 +96,60 @@ class Summary:
 
     def __init__(self, config):
         self._config, self._began = config, time.monotonic()
-        self._costs, self._slow, self._failed = Counter(), set(), set()
+        self._costs, self._exempt = Counter(), set()
 
     def pytest_runtest_logreport(self, report):
         """Add the cost of a phase; teardowns of shared fixtures belong to no test."""
         for name, cost in getattr(report, "costs", ()):
             if report.when != "teardown":
                 self._costs[name] += cost
-        if getattr(report, "slow", False):
-            self._slow.add(report.nodeid)
-        if report.failed:
-            self._failed.add(report.nodeid)
+            if report.slow or not report.passed:
+                self._exempt.add(name)
 
     def faults(self):
-        """Return what is wrong with the costs of the tests that passed."""
-        for name, cost in self._costs.items():
-            if name in self._slow | self._failed:
-                continue
+        """Return what is wrong with the costs of what has passed and is not slow."""
+        for name in self._costs.keys() - self._exempt:
+            cost, spent = self._costs[name], f"{self._costs[name]:.1f} CPU-s"
             if cost > MOST and name not in EXPENSIVE:
                 yield (
-                    f"{name} costs {cost:.1f} CPU-s of {MOST:.0f}: make it cheaper, "
-                    "mark it slow, or give a reason in EXPENSIVE (helpers/costs.py)"
+                    f"{name} costs {spent} of {MOST:.0f}: make it cheaper, mark it "
+                    "slow, or give a reason in EXPENSIVE (tests/helpers/costs.py)"
                 )
             if cost < ENOUGH and name in EXPENSIVE:
-                yield f"{name} costs {cost:.1f} CPU-s: EXPENSIVE need not name it"
+                yield f"{name} costs {spent}: EXPENSIVE need not name it"
 
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, session):
-        """Fail the run if a test costs too much."""
+        """Fail the run if something costs too much."""
         if not session.exitstatus and any(self.faults()):
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
     def pytest_terminal_summary(self, terminalreporter):
-        """Write what is wrong, and tests, seconds and the five slowest."""
+        """Write what is wrong, and a file of all costs on request."""
         for fault in self.faults():
             terminalreporter.write_line(f"FAILED {fault}", red=True)
+        if path := self._config.getoption("--costs"):
+            Path(path).write_text(json.dumps(dict(self._costs.most_common()), indent=1))
+
+    def pytest_unconfigure(self, config):
+        """Print the last line: tests, seconds and the five slowest."""
+        if not self._costs:
+            return
         tests = len([name for name in self._costs if "::" in name])
         seconds, costs = time.monotonic() - self._began, self._costs
-        cache = self._config.cache
-        if self._config.getoption("--closing"):
-            before = cache.get(FORMER, {"tests": 0, "seconds": 0.0, "costs": {}})
+        if config.getoption("--closing"):
+            before = config.cache.get(FORMER, {"tests": 0, "seconds": 0, "costs": {}})
             tests, seconds = tests + before["tests"], seconds + before["seconds"]
             costs = costs + Counter(before["costs"])
         else:
             known = dict(costs.most_common(5))
-            cache.set(FORMER, {"tests": tests, "seconds": seconds, "costs": known})
+            config.cache.set(
+                FORMER, {"tests": tests, "seconds": seconds, "costs": known}
+            )
         slowest = ", ".join(
             f"{name.removeprefix('tests/')} {cost:.1f}"
             for name, cost in costs.most_common(5)
         )
-        terminalreporter.write_line(
+        print(
             f"{tests} tests in {seconds:.0f} s; CPU-seconds of the slowest: {slowest}"
         )
-        if path := self._config.getoption("--costs"):
-            with open(path, "w") as file:
-                json.dump(dict(self._costs.most_common()), file, indent=1)

@@ -103,12 +103,7 @@ def test_a_killed_run_goes_on_where_it_stood(engine, tmp_path):
     process.wait()
     stood = json.loads(state.read_text())["steps"]
     assert 0 < stood < 24_000
-    again = ["--resume", str(folder), "--json"]
-    out = subprocess.run(
-        [*command[:4], *again], capture_output=True, text=True, check=True
-    )
-    last = json.loads(out.stdout)
-    assert last["steps"] >= 24_000
+    assert run_training(None, folder)["steps"] >= 24_000
     steps = [int(row["steps"]) for row in rows(folder)]
     assert steps == sorted(steps)
     assert stood in steps
