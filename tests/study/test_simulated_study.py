@@ -9,7 +9,7 @@ from pages import aim, line
 from study_steps import enter, plan_writer, stage
 
 from marl_airhockey.data.reader import read_head, read_recording
-from marl_airhockey.play.live_match import RATE
+from marl_airhockey.play.live_match import COUNTDOWN, RATE
 from marl_airhockey.play.report import summarize
 from marl_airhockey.study.answers import read_answers
 from marl_airhockey.study.archive import diaries
@@ -82,7 +82,9 @@ def test_a_study_of_24_people_loses_nothing(tmp_path):
         crashes, withdraws = number in CRASHES, number == WITHDRAWS
         while (where := stage(study, client)["stage"]) != "end":
             if where == "ready" and crashes and stage(study, client)["block"] == 1:
-                person.game(study, client, ticks=4 * RATE)
+                # No goal can end the game so soon after the countdown.
+                person.game(study, client, ticks=round((COUNTDOWN + 0.25) * RATE))
+                assert study.match.phase == "play"
                 study.host.recorder._writer._lock.close()  # As a kill does.
                 study = open_study(plan, out)
                 client, crashes = enter(study, person.key), False
