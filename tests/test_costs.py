@@ -16,9 +16,10 @@ def summary(monkeypatch):
     return costs.Summary(SimpleNamespace())
 
 
-def report(summary, name, cost, when="call", slow=False, passed=True):
+def report(summary, name, cost, when="call", **change):
+    known = {"slow": False, "compiled": False, "passed": True, **change}
     summary.pytest_runtest_logreport(
-        SimpleNamespace(costs=[(name, cost)], when=when, slow=slow, passed=passed)
+        SimpleNamespace(costs=[(name, cost)], when=when, **known)
     )
 
 
@@ -34,8 +35,10 @@ def test_a_test_that_costs_too_much_fails_the_run(summary):
     assert session.exitstatus == pytest.ExitCode.TESTS_FAILED
 
 
-@pytest.mark.parametrize("change", [{"slow": True}, {"passed": False}])
-def test_slow_and_failed_tests_are_not_judged(summary, change):
+@pytest.mark.parametrize(
+    "change", [{"slow": True}, {"compiled": True}, {"passed": False}]
+)
+def test_slow_failed_and_compiling_tests_are_not_judged(summary, change):
     report(summary, "tests/test_a.py::test_dear", 50.0, **change)
     report(summary, "tests/test_a.py::test_late", 50.0, when="teardown")
     assert not list(summary.faults())

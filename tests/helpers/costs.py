@@ -1,8 +1,8 @@
 """CPU-seconds of every test: what the short run may cost, and its closing line.
 
 A test of the short run above `MOST` CPU-seconds fails the run, unless `EXPENSIVE` gives
-a reason. What numba compiles is left out, as it happens once per machine. Fixtures that
-tests share are counted by themselves. Time on the clock is never judged.
+a reason. A test during which code is compiled is not judged, as that happens once per
+machine. Fixtures that tests share are counted separately. Wall time is never judged.
 """
 
 import json
@@ -12,7 +12,8 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from numba.core import event
+
+from marl_airhockey.jit.folders import code_folder
 
 MOST = 8.0
 """CPU-seconds of a test without the mark `slow`"""
@@ -35,58 +36,40 @@ def cpu_seconds():
     return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
 
 
-class Clock(event.Listener):
-    """CPU-seconds of this process without those of numba's compiler."""
-
-    def __init__(self):
-        self._compiled, self._depth, self._began = 0.0, 0, 0.0
-
-    def on_start(self, event):
-        """Note that a function begins to be compiled; some of them nest."""
-        if not self._depth:
-            self._began = time.thread_time()
-        self._depth += 1
-
-    def on_end(self, event):
-        """Note that a function has been compiled."""
-        self._depth -= 1
-        if not self._depth:
-            self._compiled += time.thread_time() - self._began
-
-    def now(self):
-        """Return CPU-seconds so far."""
-        return cpu_seconds() - self._compiled
+def compilations():
+    """Return a number that changes when any process compiles something."""
+    return code_folder().stat().st_mtime_ns
 
 
 class Measure:
     """Plugin of each worker: writes the cost of a phase into its report."""
 
     def __init__(self):
-        self._clock, self._last, self._shared = Clock(), 0.0, []
-        event.register("numba:compile", self._clock)
+        self._last, self._before, self._shared = 0.0, 0, []
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef, request):
-        before, inside = self._clock.now(), sum(cost for _, cost in self._shared)
+        before, inside = cpu_seconds(), sum(cost for _, cost in self._shared)
         result = yield
         if fixturedef.scope != "function":
             other = sum(cost for _, cost in self._shared) - inside
-            cost = self._clock.now() - before - other
+            cost = cpu_seconds() - before - other
             self._shared.append((f"fixture {fixturedef.argname}", cost))
         return result
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item):
-        self._last = self._clock.now()
+        self._last, self._before = cpu_seconds(), compilations()
         return (yield)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(self, item):
-        report, now = (yield), self._clock.now()
+        report, now = (yield), cpu_seconds()
         shared, self._shared = self._shared, []
         cost = now - self._last - sum(cost for _, cost in shared)
         report.costs = [(item.nodeid, cost), *shared]
         report.slow = item.get_closest_marker("slow") is not None
+        report.compiled = compilations() != self._before
         self._last = now
         return report
 
@@ -103,7 +86,7 @@ class Summary:
         for name, cost in getattr(report, "costs", ()):
             if report.when != "teardown":
                 self._costs[name] += cost
-            if report.slow or not report.passed:
+            if report.slow or report.compiled or not report.passed:
                 self._exempt.add(name)
 
     def faults(self):
