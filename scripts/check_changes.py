@@ -67,7 +67,7 @@ def main() -> None:
     tests = {str(t.relative_to(ROOT)) for t in map(tests_of, files) if t is not None}
     # A folder holds its files.
     tests = {t for t in tests if str(Path(t).parent) not in tests}
-    # Nothing runs beside the tests of the lab, which runs in real time.
+    # The tests of the lab run alone, because it runs in real time.
     lab = {t for t in tests if t.startswith("tests/lab")}
     for some, workers in ((tests - lab, ("-n", "2")), (lab, ())):
         if some:

@@ -194,7 +194,7 @@ FAULTS = [
         "sensing/test_sensed_contacts.py",
     ),
     Fault(
-        "robot resumes by itself",
+        "robot resumes automatically",
         "marl_airhockey/devices/robot/supervisor.py",
         "self._must_let_go |= fault in LATCHED",
         "self._must_let_go |= False",

@@ -59,6 +59,8 @@ def precompile(
         raise ValueError(unknown_name("target", target, list(shipped.LEVELS)))
     if (target is None) != (out is None):
         raise ValueError("--target and --out: give both, or none for this machine")
+    if out is not None and out.exists() and not (out / shipped.MANIFEST).exists():
+        raise ValueError(f"--out: {out} is there already; name a new folder")
     names = scenarios or scenario_names()
     seats = {name: len(find_scenario(name).scene.seats) for name in names}
     # Those with many seats take longest and begin first.
@@ -73,8 +75,9 @@ def precompile(
     given = {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
     with _variables({shipped.VARIABLE: "0", **given}):
         paths = _compile_all(work, jobs)
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir(parents=True)
+    out.mkdir(parents=True, exist_ok=True)
+    for path in out.glob("*.code"):
+        path.unlink()
     for path in paths:
         shutil.copy(path, out)
     shipped.write_manifest(out, target)

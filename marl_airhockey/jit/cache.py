@@ -1,7 +1,7 @@
 """Cache of compiled code: a file for each function, its signature and its processor.
 
 The name of a file holds a hash of all that its code depends on (`fingerprint`), so an
-edit compiles again just what it changes, and nothing else is loaded in its place.
+edit compiles again just what it changes, and no other code is ever loaded for it.
 Neither the location of the package nor modification times matter, so a fresh clone of
 the same sources starts with what an older one compiled.
 """

@@ -1,4 +1,4 @@
-"""Compiled code that comes with the package: what it is for, and whether it fits here.
+"""Compiled code that comes with the package, and whether it fits this machine.
 
 ``airhockey precompile --target x86-64-v3`` compiles for a level of processors instead
 of the one at hand. A wheel that holds the result starts without compiling. Code fits

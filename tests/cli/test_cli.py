@@ -141,6 +141,7 @@ def test_precompile_reports_what_it_compiles_and_names_bad_input(tmp_path):
     for words, reason in (
         (("jugle",), "unknown scenario 'jugle'"),
         (("--target", "pentium", "--out", tmp_path), "unknown target 'pentium'"),
+        (("--target", "generic", "--out", tmp_path), "is there already; name a new"),
         (("--target", "generic"), "--target and --out: give both"),
         (("--out", tmp_path), "--target and --out: give both"),
     ):
