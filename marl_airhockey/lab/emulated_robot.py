@@ -72,6 +72,8 @@ class EmulatedRobot:
     def start_driver(self) -> None:
         """Start a driver, as a new process does; it replaces the current one."""
         self._recoveries, self._enabled = 0, False
+        if not self.controller.script.running:
+            self.arm.connect()
         self._box = Mailbox(Mailbox.allocate())
         self.driver = Driver(self.config, self.arm, self._box, lambda: self.arm.now)
         self.driver_runs = True
@@ -140,6 +142,9 @@ class EmulatedRobot:
 
     def recover(self) -> None:
         """Request a recovery, as an operator does."""
+        if self.driver.is_over:
+            self.start_driver()
+            return
         self._recoveries += 1
         self.disable()
 
@@ -150,7 +155,8 @@ class EmulatedRobot:
     def advance(self, seconds: float) -> None:
         """Advance emulated time by some seconds."""
         for _ in range(round(seconds / DT)):
-            if self._ticks % EVERY == 0 and self.driver_runs:
+            runs = self.driver_runs and not self.driver.is_over
+            if self._ticks % EVERY == 0 and runs:
                 self.driver.cycle()
             self.arm.advance(DT)
             self._ticks += 1

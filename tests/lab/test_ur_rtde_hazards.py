@@ -239,7 +239,7 @@ def test_a_controller_that_cannot_be_used_is_refused(words, fault, reason):
 def test_an_arm_at_another_table_is_refused_and_does_not_move(running):
     before = status()["pose"]
     far = ((-0.8, 0.1), (-0.6, 0.1), (-0.6, 0.3), (-0.8, 0.3))
-    with pytest.raises(RobotError, match=r"z \+0.02 m of the table, away from"):
+    with pytest.raises(RobotError, match=r"z \+0\.020 m of the table, turned by 0 deg"):
         Robot(DriverConfig(ADDRESS, SETUP.mounting, far)).connect()
     assert status()["pose"] == before
 

@@ -299,10 +299,10 @@ class RealBackend(Backend):
     def _trouble(self, now: float) -> str:
         """Return why the episode cannot continue; "" if it can."""
         robot = self.robot
-        if not robot.is_connected:
-            return "robot: its driver has ended"
         if robot.state in (DriverState.FAULT, DriverState.HOLD):
             return f"robot: {robot.fault.label}"
+        if not robot.is_connected:
+            return "robot: its driver has ended"
         if self.scene.pucks and self._camera.age > BLIND:
             return self._camera.trouble
         last = self._tracker.last

@@ -32,6 +32,8 @@ class Reading(NamedTuple):
     joints: Array
     """(6,) angles, rad, from the base to the last wrist"""
     fault: ArmFault
+    speed_scaling: float
+    """Fraction of every programmed speed that the arm moves with: the speed slider"""
 
 
 class Arm(Protocol):
@@ -51,6 +53,9 @@ class Arm(Protocol):
 
     def follow(self, pose: Array, seconds: float) -> bool:
         """Follow a pose (6,) until the next one ``seconds`` later; False if refused."""
+
+    def release(self, pose: Array) -> None:
+        """End compliance and hold a pose (6,)."""
 
     def halt(self) -> None:
         """Brake to rest and end compliance."""

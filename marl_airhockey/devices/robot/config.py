@@ -51,9 +51,10 @@ class ServoSettings:
     """Force with which the paddle is pressed on the table, N"""
     compliance: float = 0.15
     """Largest speed of the compliant axis, m/s"""
-    deviation: float = 0.1
-    """Distance between where the paddle was sent and where it is, beyond which the arm
-    does not follow, m: more than twice the lag of a UR5e at 0.7 m/s"""
+    deviation: float = 0.085
+    """Largest gap between the sent and the measured position, as the time in which the
+    paddle covers it at its speed limit, s. A UR5e needs 0.066 s. An arm that closes a
+    gap of 0.087 s reaches the speed limit, so a larger one could make it leap."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ PRESETS = {
     # for comparison with an emulator: `Robot.connect` refuses them on every arm.
     "authors": Preset(
         MotionLimits(speed=5.2, acceleration=500.0, jerk=1e6),
-        ServoSettings(look_ahead=0.2, gain=700.0, compliance=1.5, deviation=9.0),
+        ServoSettings(look_ahead=0.2, gain=700.0, compliance=1.5, deviation=2.0),
         Pendant(speed=7.5),
     ),
 }

@@ -9,16 +9,13 @@ operator's word, and never from an emergency stop.
 
 from __future__ import annotations
 
-import os
-import signal
+import math
 import time
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from marl_airhockey.core.geometry import half_planes
-from marl_airhockey.devices.priority import raise_priority
 from marl_airhockey.devices.robot.arm import Arm, ArmFault, Reading
 from marl_airhockey.devices.robot.config import DriverConfig
 from marl_airhockey.devices.robot.mailbox import (
@@ -27,49 +24,28 @@ from marl_airhockey.devices.robot.mailbox import (
     DriverState,
     Fault,
     Mailbox,
+    Request,
     RobotObservation,
 )
-from marl_airhockey.devices.robot.shaper import Shaper
-from marl_airhockey.devices.robot.supervisor import LIFTED, Measured, Supervisor
+from marl_airhockey.devices.robot.motion import Motion
+from marl_airhockey.devices.robot.supervisor import (
+    AWAY,
+    LIFTED,
+    Measured,
+    Supervisor,
+)
 from marl_airhockey.types import Array
 
 RATE = 125.0
 """Cycles a second"""
 OVERRUN = 0.1
 """Delay of a cycle after which the paddle brakes, s"""
-MARGIN = 0.001
-"""Distance from the edge of the reach at which what is sent ends, m: the lag of the
-joints bends a path by less"""
 NEW_PROCESS = (Fault.ROBOT_SILENT, Fault.CONNECTION_LOST)
-"""Faults after which a driver must be started again"""
-AWAY = 0.05
-"""Distance from the reach, and from the table's plane, at which an arm is somewhere
-else than at the table, m"""
-
-
-def run_driver(config: DriverConfig, memory: Any) -> None:
-    """Run until the mailbox says closing, or the parent process is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    raise_priority()
-    parent, box = os.getppid(), Mailbox(memory)
-    from marl_airhockey.devices.robot.ur5e import Ur5e
-
-    try:
-        arm = Ur5e(config)
-    except Exception:
-        box.observation = RobotObservation.of_fault(Fault.NOT_CONNECTED)
-        raise
-    driver = Driver(config, arm, box)
-    try:
-        while not box.request.closing and os.getppid() == parent:
-            driver.cycle()
-            driver.wait()
-        driver.come_to_rest()
-    finally:
-        arm.close()
-        if driver.supervisor.fault in NEW_PROCESS:
-            # The client's threads would abort the process in their own way.
-            os._exit(1)
+"""Faults after which a driver ends and must be started again: its client would connect
+and send its script again for ever"""
+TURNED = 0.05
+"""Angle between the tool and its orientation on the table at which an arm is not at
+the table, rad"""
 
 
 class Driver:
@@ -93,16 +69,15 @@ class Driver:
         self._dt = 1.0 / RATE
         self._cycles = self._late = self._refused = self._logged = 0
         self._recovered, self._seen = box.request.recover, 0.0
-        self._due = clock()
-        self._filter = config.smoothing.make(self._dt)
-        reading = arm.read()
-        self.supervisor = Supervisor(self._due, reading.stamp, config.servo.deviation)
+        self._due, reading = clock(), arm.read()
+        position = self._position(reading)
+        self._motion = Motion(config, self._dt, position)
+        self.supervisor = Supervisor(self._due, reading.stamp, self._motion.most)
         self._track = np.zeros((TRACK, 3))
-        self._track[:] = self._due, *self._position(reading)[:2]
-        self._shaper = self._shaper_at(reading)
+        self._track[:] = self._due, *position[:2]
         if not self._at_table(reading):
             self.supervisor.fail(self._due, Fault.NOT_AT_TABLE)
-        elif reading.fault is ArmFault.NONE and self._position(reading)[2] > LIFTED:
+        elif reading.fault is ArmFault.NONE and position[2] > LIFTED:
             # Only in free air: on the table the contact's force would count as none.
             arm.zero_force_sensor()
 
@@ -111,18 +86,22 @@ class Driver:
         return self._config.mounting.to_table(reading.pose)
 
     def _at_table(self, reading: Reading) -> bool:
-        """Return True if the paddle is over the reach or on it."""
+        """Return True if the paddle is over the reach or on it, in its orientation."""
         *place, height = self._position(reading)
         corners = tuple((float(x), float(y)) for x, y in self._config.reach)
         normals, offsets = half_planes(corners)
         outside = -float((normals @ place + offsets).min())
-        return outside < AWAY and abs(height) < AWAY
+        turned = self._config.mounting.turned(reading.pose)
+        return outside < AWAY and -LIFTED < height < AWAY and turned < TURNED
 
-    def _shaper_at(self, reading: Reading) -> Shaper:
-        config = self._config
-        reach, place = np.array(config.reach), self._position(reading)[:2]
-        self._filter.reset(np.zeros(2))
-        return Shaper(config.limits, reach, self._dt, place, MARGIN)
+    @property
+    def is_over(self) -> bool:
+        """True after a fault for which a new driver must be started."""
+        rests = (
+            self._motion.shaper.at_rest
+            or self.supervisor.fault is Fault.CONNECTION_LOST
+        )
+        return self.supervisor.fault in NEW_PROCESS and rests
 
     def wait(self) -> None:
         """Wait for the next cycle."""
@@ -142,16 +121,24 @@ class Driver:
         """Read the arm, decide, move the paddle, and publish an observation."""
         now, reading = self._clock(), self._arm.read()
         request, supervisor = self._box.request, self.supervisor
-        position = self._position(reading)
+        position, before = self._position(reading), supervisor.state
         measured = Measured(
             float(position[2]),
-            float(np.linalg.norm(position[:2] - self._shaper.place)),
-            bool(np.any(self._shaper.velocity)),
+            self._motion.measure(reading.stamp, position),
+            not self._motion.shaper.at_rest,
         )
         supervisor.watch_arm(now, reading, measured)
         supervisor.watch_request(now, request, measured)
-        if supervisor.state is not DriverState.FAULT:
-            self._move(now)
+        if supervisor.state is DriverState.RUNNING:
+            self._motion.scale_speed(reading.speed_scaling)
+            self._move(now, request)
+        elif supervisor.state is not DriverState.FAULT:
+            self._come_to_rest(now, reading, position)
+        elif (
+            supervisor.fault is Fault.PADDLE_OFF_TABLE
+            and before is not supervisor.state
+        ):
+            self._arm.halt()
         elif request.recover > self._recovered:
             self._recovered = request.recover
             self._recover(now)
@@ -159,34 +146,39 @@ class Driver:
             now, reading = self._clock(), self._arm.read()
         elif supervisor.fault is Fault.ROBOT_SILENT and measured.moving:
             # It may still hear: braking is better than a pose that stands still.
-            self._send(now, self._shaper.brake())
+            self._motion.brake()
+            self._send(now)
         self._cycles += 1
         self._publish(now, reading)
 
-    def _move(self, now: float) -> None:
-        request, supervisor = self._box.request, self.supervisor
-        if supervisor.state is not DriverState.RUNNING:
-            self._send(now, self._shaper.brake())
-            self._filter.reset(self._shaper.velocity)
-            return
-        velocity = np.array([request.vx, request.vy])
-        finite = bool(np.isfinite(velocity).all())
+    def _move(self, now: float, request: Request) -> None:
+        """Move the paddle, pressed on the table, as the request says."""
+        size = math.hypot(request.vx, request.vy)
+        finite = math.isfinite(size) and math.isfinite(request.seconds)
         if request.stamp != self._seen:
             self._seen = request.stamp
             self._refused += not finite
-        if not supervisor.pressed_at:
+        if not self.supervisor.pressed_at:
             self._arm.press(self._config.mounting.frame(), self._config.servo.force)
-            supervisor.pressed_at = now
-        if not finite:
-            self._send(now, self._shaper.brake())
-            self._filter.reset(self._shaper.velocity)
-            return
-        left = max(request.stamp + request.seconds - now, 0.0)
-        self._send(now, self._shaper.step(*self._filter.step(velocity, left)))
+            self.supervisor.pressed_at, self._motion.height = now, 0.0
+        if finite:
+            left = max(request.stamp + request.seconds - now, 0.0)
+            self._motion.step(np.array([request.vx, request.vy]), left)
+        else:
+            self._motion.brake()
+        self._send(now)
 
-    def _send(self, now: float, place: Array) -> None:
-        pose = self._config.mounting.pose(place)
-        if self._arm.follow(pose, self._dt):
+    def _come_to_rest(self, now: float, reading: Reading, position: Array) -> None:
+        """Brake in the table's plane, then hold the paddle's height, too."""
+        self._motion.come_to_rest(reading, position)
+        self._send(now)
+        if self.supervisor.pressed_at and self._motion.shaper.at_rest:
+            self.supervisor.pressed_at = 0.0
+            self._motion.height = float(position[2])
+            self._arm.release(self._motion.pose)
+
+    def _send(self, now: float) -> None:
+        if self._arm.follow(self._motion.pose, self._dt):
             return
         if self.supervisor.state is not DriverState.FAULT:
             fault = self._arm.read().fault
@@ -197,20 +189,20 @@ class Driver:
         """Recover from a stop, on an operator's word; never from an emergency stop."""
         fault, reading = self.supervisor.fault, self._arm.read()
         emergency = reading.fault is ArmFault.EMERGENCY_STOP
-        if emergency or fault is Fault.EMERGENCY_STOP:
+        if emergency or fault is Fault.EMERGENCY_STOP or fault in NEW_PROCESS:
             return
-        if fault in NEW_PROCESS or self.supervisor.silent(now):
+        if self.supervisor.silent(now):
             # Its client may be beyond repair; the caller starts a new process.
             return
         stopped = reading.fault is not ArmFault.NONE
         if not self._at_table(reading) or (stopped and self._arm.unlock()):
             return
-        self._shaper = self._shaper_at(self._arm.read())
+        self._motion.stay(self._position(self._arm.read()))
         self._due = self._clock()
         self.supervisor.recovered(self._due, bool(self._box.request.enabled))
 
     def _publish(self, now: float, reading: Reading) -> None:
-        mounting, shaper = self._config.mounting, self._shaper
+        mounting, shaper = self._config.mounting, self._motion.shaper
         x, y, z = self._position(reading).tolist()
         vx, vy, _ = mounting.rotate_to_table(reading.velocity).tolist()
         self._track[:-1] = self._track[1:]
@@ -240,18 +232,21 @@ class Driver:
             cycles=self._cycles,
             late=self._late,
             refused=self._refused,
+            turned=mounting.turned(reading.pose),
+            speed_scaling=self._motion.scaling,
             braked_at=self.supervisor.braked_at,
         )
 
-    def come_to_rest(self) -> None:
+    def close(self) -> None:
         """Brake, as far as the arm still follows, and report that the driver ends."""
         until = self._clock() + 1.0
         while (
             self.supervisor.state is not DriverState.FAULT
-            and np.any(self._shaper.velocity)
+            and not self._motion.shaper.at_rest
             and self._clock() < until
         ):
-            self._send(self._clock(), self._shaper.brake())
+            self._motion.brake()
+            self._send(self._clock())
             time.sleep(self._dt)
         self.supervisor.close(self._clock())
         self._publish(self._clock(), self._arm.read())

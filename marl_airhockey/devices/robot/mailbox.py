@@ -51,6 +51,8 @@ class Fault(IntEnum):
     NOT_AT_TABLE = 9
     DEVIATION = 10
     CONNECTION_LOST = ArmFault.CONNECTION_LOST
+    PADDLE_BELOW_TABLE = 12
+    PADDLE_OFF_TABLE = 13
 
     @property
     def label(self) -> str:
@@ -89,6 +91,10 @@ class RobotObservation(NamedTuple):
     wrist_1: float
     wrist_2: float
     wrist_3: float
+    turned: float
+    """Angle between the tool and its orientation on the table, rad"""
+    speed_scaling: float
+    """Fraction of the speed limit that the speed slider leaves"""
     cycles: int
     """Number of cycles of the driver"""
     late: int

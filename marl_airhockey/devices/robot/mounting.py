@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from marl_airhockey.devices.robot.kinematics import matrix_of
+from marl_airhockey.devices.robot.kinematics import matrix_of, vector_of
 from marl_airhockey.types import Array
 
 
@@ -71,6 +71,11 @@ class Mounting:
     def to_table(self, pose: Array) -> Array:
         """Return the position (3,), table frame, m, of a pose (6,), base frame."""
         return np.asarray((np.asarray(pose)[:3] - self._origin) @ self._rotation)
+
+    def turned(self, pose: Array) -> float:
+        """Return the angle of a pose (6,) from the orientation on the table, rad."""
+        here, there = (matrix_of(np.array(v, float)) for v in (pose[3:], self.tool))
+        return float(np.linalg.norm(vector_of(np.ascontiguousarray(here @ there.T))))
 
     def rotate_to_table(self, velocity: Array) -> Array:
         """Return a velocity (3,), base frame, in the table frame, m/s."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
+import threading
 import time
 from collections.abc import Mapping
 from multiprocessing.context import SpawnProcess
@@ -12,7 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from marl_airhockey.devices.robot.config import DriverConfig
-from marl_airhockey.devices.robot.driver import NEW_PROCESS, run_driver
+from marl_airhockey.devices.robot.driver import NEW_PROCESS, TURNED
 from marl_airhockey.devices.robot.limits import check_reach, read_limits
 from marl_airhockey.devices.robot.mailbox import (
     DriverState,
@@ -22,6 +24,8 @@ from marl_airhockey.devices.robot.mailbox import (
     RobotObservation,
     Transition,
 )
+from marl_airhockey.devices.robot.process import run_driver
+from marl_airhockey.devices.robot.supervisor import AWAY, LIFTED
 from marl_airhockey.devices.robot.ur5e import check_controller
 from marl_airhockey.types import Array
 
@@ -65,6 +69,7 @@ class Robot:
         self._box: Mailbox | None = None
         self._process: SpawnProcess | None = None
         self._enabled, self._recoveries = 0.0, 0.0
+        self._lock = threading.Lock()
 
     def __enter__(self) -> Self:
         self.connect()
@@ -111,8 +116,11 @@ class Robot:
             x, y, z = observation.x, observation.y, observation.z
             raise RobotError(
                 f"robot at {self.config.host}: the tool is at x {x:+.2f}, y {y:+.2f}, "
-                f"z {z:+.2f} m of the table, away from its reach; move it there by "
-                "hand, or calibrate the mounting again"
+                f"z {z:+.3f} m of the table, turned by "
+                f"{np.degrees(observation.turned):.0f} deg; expected over its reach, "
+                f"z {-LIFTED} to {AWAY} m, turned by at most "
+                f"{np.degrees(TURNED):.0f} deg; move it there by hand, or calibrate "
+                "the mounting again"
             )
         raise RobotError(
             f"robot at {self.config.host}: its program did not start; does another "
@@ -184,11 +192,15 @@ class Robot:
 
     def enable(self) -> None:
         """Take commands from now on; whoever holds the enabling device calls it."""
-        self._request(np.zeros(2), 0.0, 1.0)
+        with self._lock:
+            self._enabled = 1.0
+            self._request(np.zeros(2), 0.0)
 
     def disable(self) -> None:
-        """Brake and take no commands."""
-        self._request(np.zeros(2), 0.0, 0.0)
+        """Brake and take no commands, also those of other threads."""
+        with self._lock:
+            self._enabled = 0.0
+            self._request(np.zeros(2), 0.0)
 
     def send_action(self, velocity: Array, seconds: float) -> Array:
         """Command a velocity, to be reached in some seconds.
@@ -203,19 +215,26 @@ class Robot:
             (2,) velocity that the driver was sent, m/s: no faster than the limits
             allow, and zero for one that is not finite or while the robot is not
             enabled. What the arm was sent in turn is in the next observation.
+
+        Raises:
+            ValueError: The velocity has another shape.
         """
-        self._request(velocity, seconds, self._enabled)
-        speed = float(np.linalg.norm(velocity))
-        if not (np.isfinite(speed) and self._enabled):
+        velocity = np.asarray(velocity, float)
+        if velocity.shape != (2,):
+            raise ValueError(f"velocity: shape {velocity.shape}; expected (2,), m/s")
+        with self._lock:
+            self._request(velocity, seconds)
+            enabled = self._enabled
+        speed = math.hypot(*velocity)
+        if not (math.isfinite(speed) and math.isfinite(seconds) and enabled):
             return np.zeros(2)
         fit = min(1.0, self.config.limits.speed / max(speed, 1e-12))
-        return np.asarray(velocity, float) * fit
+        return velocity * fit
 
-    def _request(self, velocity: Array, seconds: float, enabled: float) -> None:
-        self._enabled = enabled
+    def _request(self, velocity: Array, seconds: float) -> None:
         self._mailbox.request = Request(
-            *(float(velocity[0]), float(velocity[1]), seconds, time.monotonic()),
-            *(enabled, self._recoveries, 0.0),
+            *(float(velocity[0]), float(velocity[1]), float(seconds)),
+            *(time.monotonic(), self._enabled, self._recoveries, 0.0),
         )
 
     def go_to(self, position: Array, seconds: float = 10.0) -> None:
@@ -256,7 +275,8 @@ class Robot:
             self.disconnect()
             self.connect()
             return
-        self._recoveries += 1
+        with self._lock:
+            self._recoveries += 1
         self.disable()
         until = time.monotonic() + RECOVERY
         while time.monotonic() < until:

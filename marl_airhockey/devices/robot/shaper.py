@@ -75,6 +75,7 @@ class Shaper:
         margin: float = 0.0,
     ) -> None:
         self._limits, self._dt = limits, dt
+        self._speed = limits.speed
         corners = tuple((float(x), float(y)) for x, y in reach)
         normals, offsets = half_planes(corners)
         self._offsets = offsets - margin
@@ -104,6 +105,15 @@ class Shaper:
         """(2,) acceleration of the last step, m/s2."""
         return _array(self._acceleration)
 
+    @property
+    def at_rest(self) -> bool:
+        """True if the last commanded positions do not move."""
+        return abs(self._velocity) < AT_REST
+
+    def scale_speed(self, fraction: float) -> None:
+        """Limit the speed to a fraction, 0 to 1, of the limit."""
+        self._speed = fraction * self._limits.speed
+
     def step(self, velocity: Array, seconds: float) -> Array:
         """Move by ``dt`` and return the new position (2,), m.
 
@@ -111,7 +121,7 @@ class Shaper:
             velocity: (2,) target velocity, m/s; rest if it is not finite.
             seconds: Time of a linear ramp to it, s; 0 for as fast as possible.
         """
-        target = self._inside(_fitted(complex(*velocity), self._limits.speed))
+        target = self._inside(_fitted(complex(*velocity), self._speed))
         moved = self._velocity, self._acceleration
         return self._advance(self._recoverable(self._toward(target, seconds, *moved)))
 
@@ -162,7 +172,7 @@ class Shaper:
         way = []
         for _ in range(LONGEST):
             last, velocity = velocity, velocity + acceleration * dt
-            if abs(velocity) > self._limits.speed:
+            if abs(velocity) > self._speed:
                 return False
             place += 0.5 * (last + velocity) * dt
             way.append(place)

@@ -1,9 +1,12 @@
 """Supervisor: the states of a driver, and every reason to leave one of them.
 
     READY    at rest; commands are not taken until the caller enables the driver
-    RUNNING  enabled: the paddle moves as commanded
+    RUNNING  enabled: the paddle moves as commanded, pressed on the table
     HOLD     enabled, and braked or braking, because something is missing
     FAULT    the arm does not follow; a person has to look
+
+Outside RUNNING the paddle brakes in the plane. Once it rests there, the arm is stiff
+along the table's normal, too.
 
 A HOLD ends when what was missing is there again; one of `LATCHED` ends only when the
 caller disables the driver. A FAULT ends by `recovered` alone, which follows an
@@ -31,10 +34,16 @@ SILENT_AT_REST = 1.0
 """The same of a robot at rest that nobody holds enabled, s: a machine that opens a page
 may be busy for a moment"""
 LIFTED = 0.003
-"""Distance from the table's plane at which a paddle is on a puck or a rail, m"""
+"""Distance from the table's plane at which a paddle is on a puck or a rail, or below
+the table, m"""
+AWAY = 0.05
+"""Distance from the reach, and above the table's plane, at which an arm is somewhere
+else than at the table, m"""
+OFF_TABLE = 0.02
+"""Distance from the table's plane at which a paddle that was on it has left it, m"""
 PRESSED = 1.0
 """Time for which a paddle may take to come down on the table after it was pressed, s"""
-LATCHED = (Fault.PADDLE_LIFTED, Fault.DEVIATION)
+LATCHED = (Fault.PADDLE_LIFTED, Fault.PADDLE_BELOW_TABLE, Fault.DEVIATION)
 """Reasons of a HOLD that ends only when the caller disables the driver"""
 log = logging.getLogger("marl_airhockey.robot")
 
@@ -56,8 +65,7 @@ class Supervisor:
     Args:
         now: Time of the monotonic clock, s.
         stamp: Time of the robot's clock, s.
-        deviation: Distance from where it was sent beyond which an arm does not follow,
-            m.
+        deviation: Largest gap between the sent and the measured position, m.
     """
 
     def __init__(self, now: float, stamp: float, deviation: float) -> None:
@@ -109,6 +117,16 @@ class Supervisor:
             self.fail(now, Fault.ROBOT_SILENT)
         elif reading.fault is not ArmFault.NONE:
             self.fail(now, Fault(reading.fault))
+        elif not self._near_table(now, measured.height):
+            self.fail(now, Fault.PADDLE_OFF_TABLE)
+
+    def _is_down(self, now: float) -> bool:
+        """Return True if the paddle must have come down on the table."""
+        return bool(self.pressed_at) and now - self.pressed_at > PRESSED
+
+    def _near_table(self, now: float, height: float) -> bool:
+        above = OFF_TABLE if self._is_down(now) else AWAY + OFF_TABLE
+        return -OFF_TABLE <= height <= above
 
     def _learn_why(self, now: float, reading: Reading) -> None:
         """Take the reason of a stop, which may arrive after its effect."""
@@ -120,17 +138,18 @@ class Supervisor:
         """Enter READY, RUNNING or HOLD, as the caller's request says."""
         if self.state is DriverState.FAULT:
             return
-        down = self.pressed_at and now - self.pressed_at > PRESSED
         if not request.enabled:
             self._must_let_go = False
             self._change(now, DriverState.READY, Fault.NONE)
         elif self._must_let_go:
             pass
-        elif down and abs(measured.height) > LIFTED:
+        elif measured.height < -LIFTED:
+            self.hold(now, Fault.PADDLE_BELOW_TABLE)
+        elif self._is_down(now) and measured.height > LIFTED:
             self.hold(now, Fault.PADDLE_LIFTED)
         elif measured.deviation > self._deviation:
             self.hold(now, Fault.DEVIATION)
-        elif now - request.stamp > STALE:
+        elif not now - request.stamp <= STALE:
             self.hold(now, Fault.COMMAND_STALE)
         else:
             self._change(now, DriverState.RUNNING, Fault.NONE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,6 +41,7 @@ VARIABLES = (
     *("timestamp", "actual_TCP_pose", "actual_TCP_speed", "actual_TCP_force"),
     "actual_q",
     *("safety_status_bits", "safety_mode", "runtime_state", "robot_status_bits"),
+    *("speed_scaling", "target_speed_fraction"),
 )
 
 
@@ -170,6 +172,8 @@ class Ur5e:
             np.array(r.getActualTCPForce()),
             np.array(r.getActualQ()),
             self._fault(),
+            # The slider, times what else slows the arm.
+            r.getSpeedScaling() * r.getTargetSpeedFraction(),
         )
 
     def _fault(self) -> ArmFault:
@@ -193,8 +197,26 @@ class Ur5e:
     def press(self, frame: Array, newtons: float) -> None:
         wrench = [0.0, 0.0, -abs(newtons), 0.0, 0.0, 0.0]
         limits = [2.0, 2.0, self._servo.compliance, 1.0, 1.0, 1.0]
-        self._control().forceMode(list(frame), [0, 0, 1, 0, 0, 0], wrench, 2, limits)
+        program = self._control()
+        axes = [0, 0, 1, 0, 0, 0]
+        self._obeys(lambda: program.forceMode(list(frame), axes, wrench, 2, limits))
         self._wait_cycle()
+
+    def release(self, pose: Array) -> None:
+        # The pose first: a stiff arm moves to the last height that it was sent.
+        if self.follow(pose, CYCLE):
+            self._wait_cycle()
+            self._obeys(self._control().forceModeStop)
+
+    def _obeys(self, command: Callable[[], bool]) -> bool:
+        """Return whether the controller takes a command of the client."""
+        try:
+            return command()
+        except RuntimeError:
+            # The connection is lost. The client reconnects for ever, and uploads its
+            # script each time: nothing of it can be used again.
+            self._lost = True
+            return False
 
     def _wait_cycle(self) -> None:
         """Wait until the controller has read its registers.
@@ -210,22 +232,17 @@ class Ur5e:
         # and acceleration do nothing: both are the shaper's.
         if not np.isfinite(pose).all():
             return False
-        loop = self._servo.look_ahead, self._servo.gain
-        try:
-            sent = self._control().servoL(list(pose), 0.5, 0.5, seconds, *loop)
-        except RuntimeError:
-            # The connection is lost. The client reconnects for ever, and uploads its
-            # script each time: nothing of it can be used again.
-            self._lost = True
-            return False
-        if not sent:
+        loop, program = (self._servo.look_ahead, self._servo.gain), self._control()
+        sent = self._obeys(lambda: program.servoL(list(pose), 0.5, 0.5, seconds, *loop))
+        if not (sent or self._lost):
             time.sleep(ARRIVED)
-        return bool(sent)
+        return sent
 
     def halt(self) -> None:
         # `stopL` brakes joints; this is the one that does what its name says.
-        self._control().servoStop(STOP)
-        self._control().forceModeStop()
+        program = self._control()
+        if self._obeys(lambda: program.servoStop(STOP)):
+            self._obeys(program.forceModeStop)
 
     def unlock(self) -> str:
         from dashboard_client import DashboardClient

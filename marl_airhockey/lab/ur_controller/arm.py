@@ -42,6 +42,9 @@ FORCE_LIMIT = 150.0
 """Force on the tool beyond which the arm stops, N"""
 FORCE_DAMPING = 100.0
 """Force error for each m/s of the compliant axis, Ns/m"""
+SCALING_RATE = 4.0
+"""Change of the speed scaling per second after the speed slider has moved: 1 to 0 in
+0.25 s"""
 
 
 class Safety(IntEnum):
@@ -83,6 +86,8 @@ class Arm:
     """Cause of the last stop"""
     speed_fraction: float = 1.0
     """Speed slider: fraction of every programmed speed"""
+    speed_scaling: float = 1.0
+    """Fraction of every programmed speed now: it follows the slider in a ramp"""
 
     def __post_init__(self) -> None:
         self.speeds = np.zeros(6)
@@ -91,7 +96,11 @@ class Arm:
         """(6,) joint angles that the motion aims at"""
         self.payload = 0.0
         self._force_zero = np.zeros(6)
-        self._height = 0.0
+        self.force_drift = np.zeros(6)
+        """(6,) error of the force sensor, base frame, N and Nm, a fault"""
+        self.lag = 1.0
+        """Factor on the lag of `servoL` and `servoJ`, a fault"""
+        self._last_scaling = self.speed_scaling
         self.mount(self.tool)
 
     def mount(self, tool: Array) -> None:
@@ -118,11 +127,11 @@ class Arm:
     @property
     def measured_force(self) -> Array:
         """(6,) N and Nm, relative to when the sensor was zeroed, base frame."""
-        return np.asarray(self.reading.force - self._force_zero)
+        return np.asarray(self.reading.force - self._force_zero + self.force_drift)
 
     def zero_force_sensor(self) -> None:
         """Take the present force as zero, a contact's too, as the real sensor does."""
-        self._force_zero = self.reading.force.copy()
+        self._force_zero = self.reading.force + self.force_drift
 
     def rehearse(self) -> None:
         """Make every motion on a copy, so that all is compiled before time counts."""
@@ -176,14 +185,7 @@ class Arm:
 
     def press(self, force: Force | None) -> None:
         """Become compliant, or stiff again (None)."""
-        if force is not None and self.force is None:
-            self._height = self._along(force)
         self.force = force
-
-    def _along(self, force: Force) -> float:
-        """Return the position along the compliant axis, m."""
-        frame = pose_of(force.frame)
-        return float((self.pose[:3, 3] - frame[:3, 3]) @ frame[:3, 2])
 
     @property
     def at_rest(self) -> bool:
@@ -192,15 +194,19 @@ class Arm:
 
     def step(self) -> None:
         """Move by a period of the controller."""
+        most = SCALING_RATE * DT
+        self._last_scaling = self.speed_scaling
+        change = self.speed_fraction - self.speed_scaling
+        self.speed_scaling += min(max(change, -most), most)
         goal = self._goal_speeds(self.motion)
-        change = np.clip(
-            (goal - self.speeds) / DT, -JOINT_ACCELERATION, JOINT_ACCELERATION
-        )
-        self.rates, self.speeds = change, self.speeds + change * DT
+        if self.force is not None:
+            goal = goal + self._compliance(self.force, goal)
+        rates = (goal - self.speeds) / DT
+        fastest = float(np.abs(rates).max())
+        self.rates = rates * min(1.0, JOINT_ACCELERATION / max(fastest, 1.0))
+        self.speeds = self.speeds + self.rates * DT
         self.angles = self.angles + self.speeds * DT
         self._update_pose()
-        if self.force is not None:
-            self._comply(self.force)
         self._touch()
         self._watch()
 
@@ -211,12 +217,17 @@ class Arm:
             left = max(fastest - motion.deceleration * DT, 0.0)
             return np.asarray(self.speeds * (left / fastest if fastest else 0.0))
         if isinstance(motion, Servo):
-            # A slower clock of the program is a slower lag.
-            rate = HALF_RISE / motion.half_rise * self.speed_fraction
-            pull = rate * rate * (self.target - self.angles) - 2 * rate * self.speeds
-            return np.asarray(self.speeds + pull * DT)
+            # The program's time passes more slowly than the clock.
+            rate, scale = HALF_RISE / (self.lag * motion.half_rise), self.speed_scaling
+            if min(scale, self._last_scaling) < 1e-6:
+                return np.zeros(6)
+            own, away = self.speeds / self._last_scaling, self.target - self.angles
+            if self.force is not None:
+                away = away - self._along_axis(self.force)
+            pull = rate * rate * away - 2 * rate * own
+            return np.asarray(scale * (own + pull * scale * DT))
         if isinstance(motion, JointSpeed):
-            change = self.speed_fraction * motion.speeds - self.speeds
+            change = self.speed_scaling * motion.speeds - self.speeds
             most = motion.acceleration * DT
             return np.asarray(self.speeds + np.clip(change, -most, most))
         if isinstance(motion, JointLine):
@@ -229,21 +240,21 @@ class Arm:
         if left < 1e-4 and self.at_rest:
             self.motion = Halt()
         ease = float(np.sqrt(motion.acceleration * left))
-        top = min(motion.speed * self.speed_fraction, ease, 8.0 * left)
+        top = min(motion.speed * self.speed_scaling, ease, 8.0 * left)
         change = way / max(left, 1e-9) * top - self.speeds
         most = 2.0 * motion.acceleration * DT
         return np.asarray(self.speeds + np.clip(change, -most, most))
 
     def _tool_speeds(self, motion: Speed | Line) -> Array:
         if isinstance(motion, Speed):
-            goal, most = self.speed_fraction * motion.twist, motion.acceleration
+            goal, most = self.speed_scaling * motion.twist, motion.acceleration
         else:
             way = motion.pose[:3] - self.pose[:3, 3]
             left = float(np.linalg.norm(way))
             if left < 1e-4 and self.at_rest:
                 self.motion = Halt()
             ease = float(np.sqrt(motion.acceleration * left))
-            top = min(motion.speed * self.speed_fraction, ease, 8.0 * left)
+            top = min(motion.speed * self.speed_scaling, ease, 8.0 * left)
             goal, most = np.zeros(6), 2.0 * motion.acceleration
             goal[:3] = way / max(left, 1e-9) * top
             rotated = np.eye(4)
@@ -254,16 +265,29 @@ class Arm:
         fit = min(1.0, most * DT / size) if size else 1.0
         return np.asarray(joint_speeds(self._jacobian, self.twist + fit * change))
 
-    def _comply(self, force: Force) -> None:
-        """Move the tool along the compliant axis, as fast as the force error says."""
+    def _along_axis(self, force: Force) -> Array:
+        """Return the part (6,) of the way to the target that is along the axis, rad.
+
+        A compliant axis follows no target.
+        """
+        axis = pose_of(force.frame)[:3, 2]
+        aim = (forward(self.target)[0] @ self._tool)[:3, 3]
+        twist = np.zeros(6)
+        twist[:3] = ((aim - self.pose[:3, 3]) @ axis) * axis
+        return np.asarray(joint_speeds(self._jacobian, twist))
+
+    def _compliance(self, force: Force, speeds: Array) -> Array:
+        """Return the change of the joint speeds (6,) by which the tool complies.
+
+        Along the compliant axis the tool moves as fast as the force error says,
+        whatever the motion calls for.
+        """
         axis = pose_of(force.frame)[:3, 2]
         error = self.measured_force[:3] @ axis + force.newtons
         speed = float(np.clip(error / FORCE_DAMPING, -force.speed, force.speed))
-        self._height += speed * DT
         twist = np.zeros(6)
-        twist[:3] = (self._height - self._along(force)) * axis
-        self.angles = self.angles + joint_speeds(self._jacobian, twist)
-        self._update_pose()
+        twist[:3] = (speed - (self._jacobian @ speeds)[:3] @ axis) * axis
+        return np.asarray(joint_speeds(self._jacobian, twist))
 
     def _watch(self) -> None:
         """Stop for safety where joints or tool exceed what they may."""

@@ -177,8 +177,9 @@ class Controller:
             "safety_status_bits": SAFETY_BITS[arm.safety],
             "safety_mode": int(arm.safety),
             "robot_mode": RUNNING if self.powered else POWER_OFF,
-            "speed_scaling": arm.speed_fraction,
-            "target_speed_fraction": arm.speed_fraction,
+            # The slider, and what else slows the arm: nothing.
+            "speed_scaling": arm.speed_scaling,
+            "target_speed_fraction": 1.0,
             "speed_slider_fraction": arm.speed_fraction,
             "actual_digital_output_bits": self._outputs,
             "payload": arm.payload,

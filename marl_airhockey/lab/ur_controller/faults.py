@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from marl_airhockey.lab.ur_controller.arm import Safety
 from marl_airhockey.lab.ur_controller.controller import Controller
 from marl_airhockey.lab.ur_controller.plant import EmptyTable
@@ -15,6 +17,10 @@ DELAY = 0.1
 """Delay of delayed packets, s"""
 STALL = 0.08
 """Time for which a controller without real time does nothing, twice a second, s"""
+LAG = 4.0
+"""Factor on the lag of an arm whose look-ahead is too long"""
+DRIFT = 6.0
+"""Error of a force sensor that drifts, along the base's z, N"""
 SLOW = 0.1
 """Fraction to which somebody turns the speed slider"""
 
@@ -26,6 +32,8 @@ class Fault(NamedTuple):
     """Description of what happens"""
     switch: Callable[[Controller, bool], None]
     """Function that switches it on or off"""
+    source: str = ""
+    """Public report of the fault on a real arm; "" for a fault of the lab's own list"""
 
 
 def _protective_stop(controller: Controller, on: bool) -> None:
@@ -70,6 +78,14 @@ def _slowed(controller: Controller, on: bool) -> None:
     controller.arm.speed_fraction = SLOW if on else 1.0
 
 
+def _lagging(controller: Controller, on: bool) -> None:
+    controller.arm.lag = LAG if on else 1.0
+
+
+def _drifting(controller: Controller, on: bool) -> None:
+    controller.arm.force_drift = np.array([0.0, 0.0, DRIFT if on else 0.0, 0, 0, 0])
+
+
 def _local(controller: Controller, on: bool) -> None:
     controller.remote = not on
 
@@ -89,5 +105,15 @@ FAULTS = {
     "speed_slider": Fault("somebody turns the speed slider to 10 %", _slowed),
     "local_control": Fault("the pendant is switched to local control", _local),
     "power_off": Fault("the arm has no power; its brakes hold it", _powered_off),
+    "servo_lag": Fault(
+        "the arm follows four times as late",
+        _lagging,
+        "Universal_Robots_Client_Library issue 86",
+    ),
+    "force_drift": Fault(
+        "the force sensor reports 6 N too much",
+        _drifting,
+        "Universal Robots forum 41657",
+    ),
 }
 """Faults by name"""

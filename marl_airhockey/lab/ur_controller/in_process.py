@@ -67,7 +67,11 @@ class InProcessArm:
         self._stall_left = 0.0
         self._samples: deque[Sample] = deque()
         self._values = controller.values()
-        controller.upload(SCRIPT)
+        self.connect()
+
+    def connect(self) -> None:
+        """Start the program on the controller, as a new client does."""
+        self.controller.upload(SCRIPT)
         self._set_watchdog()
 
     def _send(self, recipe: Recipe, *numbers: float) -> None:
@@ -117,6 +121,7 @@ class InProcessArm:
             np.array(values["actual_TCP_force"]),
             np.array(values["actual_q"]),
             self._fault(),
+            values["speed_scaling"] * values["target_speed_fraction"],
         )
 
     def _fault(self) -> ArmFault:
@@ -147,6 +152,12 @@ class InProcessArm:
         """Take the present force as zero."""
         self._command(8)
 
+    def release(self, pose: Array) -> None:
+        """End compliance and hold a pose (6,)."""
+        if self.follow(pose, DT):
+            self.advance(4 * DT)
+            self._command(7)
+
     def halt(self) -> None:
         """Brake to rest and end compliance."""
         self._command(16, STOP)
@@ -158,8 +169,7 @@ class InProcessArm:
             return LOCKED
         self._send(NONE, 0)
         self.advance(0.05)
-        self.controller.upload(SCRIPT)
-        self._set_watchdog()
+        self.connect()
         return ""
 
     def close(self) -> None:

@@ -1,0 +1,119 @@
+"""Motion of a paddle: the positions and heights that an arm is sent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from marl_airhockey.devices.robot.arm import Reading
+from marl_airhockey.devices.robot.config import DriverConfig
+from marl_airhockey.devices.robot.shaper import Shaper
+from marl_airhockey.types import Array
+
+MARGIN = 0.001
+"""Distance from the edge of the reach at which what is sent ends, m: the lag of the
+joints bends a path by less"""
+AT_REST = 0.01
+"""Speed of the paddle in the table's plane below which it rests, m/s"""
+LEAST_GAP = 0.001
+"""Gap between the sent and the measured position that is allowed at any speed, m"""
+SCALING_RISE = 2.0
+"""Largest rise per second of the fraction of the speed limit that is used, after the
+speed slider was low"""
+
+
+class Motion:
+    """Motion of one paddle, table frame.
+
+    Args:
+        config: Configuration of the driver.
+        dt: Time of a cycle, s.
+        position: (3,) present position of the paddle, m.
+    """
+
+    def __init__(self, config: DriverConfig, dt: float, position: Array) -> None:
+        self._config, self._dt = config, dt
+        self._filter = config.smoothing.make(dt)
+        self.most = max(config.servo.deviation * config.limits.speed, LEAST_GAP)
+        """Largest gap between the sent and the measured position, m"""
+        self.scaling = 1.0
+        """Fraction of the speed limit that is used"""
+        self.stay(position)
+
+    def stay(self, position: Array) -> None:
+        """Take a position (3,) as the one to be sent, at rest."""
+        self.height = float(position[2])
+        """Height of the sent position, m; a compliant arm does not follow it"""
+        self._stamp, self._ahead = math.nan, np.zeros(2)
+        self._rest_at(np.array(position[:2], float))
+        self._settled = True
+
+    def _rest_at(self, place: Array) -> None:
+        config = self._config
+        self._filter.reset(np.zeros(2))
+        reach = np.array(config.reach)
+        self.shaper = Shaper(config.limits, reach, self._dt, place, MARGIN)
+
+    @property
+    def pose(self) -> Array:
+        """(6,) pose of the sent position, base frame, m and rad."""
+        return self._config.mounting.pose(self.shaper.place, self.height)
+
+    def measure(self, stamp: float, position: Array) -> float:
+        """Return the gap between the sent and a measured position (3,), m.
+
+        Args:
+            stamp: Time of the measurement, of the robot's clock, s.
+            position: (3,) m.
+        """
+        if stamp != self._stamp:
+            # An old position is behind the arm, and not the arm behind its target.
+            self._stamp, self._ahead = stamp, self.shaper.place - position[:2]
+        return float(np.linalg.norm(self._ahead))
+
+    def scale_speed(self, fraction: float) -> None:
+        """Limit the speed to the fraction that the speed slider leaves.
+
+        An arm that moves slower than it is sent would leap when the slider returns.
+        """
+        fraction = min(max(fraction, 0.0), 1.0) if math.isfinite(fraction) else 0.0
+        self.scaling = min(fraction, self.scaling + SCALING_RISE * self._dt)
+        self.shaper.scale_speed(self.scaling)
+
+    def step(self, velocity: Array, left: float) -> None:
+        """Move by a cycle toward a velocity.
+
+        Args:
+            velocity: (2,) commanded velocity, m/s, finite.
+            left: Time until it is to be reached, s.
+        """
+        self._settled = False
+        # A filter may overflow on a number that is finite.
+        size = max(math.hypot(*velocity), 1e-12)
+        fitted = velocity * min(1.0, self._config.limits.speed / size)
+        self.shaper.step(*self._filter.step(fitted, left))
+
+    def brake(self) -> None:
+        """Move by a cycle toward rest."""
+        self.shaper.brake()
+        self._filter.reset(self.shaper.velocity)
+
+    def come_to_rest(self, reading: Reading, position: Array) -> None:
+        """Move by a cycle toward rest where the arm is.
+
+        Args:
+            reading: Newest reading of the arm.
+            position: (3,) its paddle, m.
+        """
+        gap, place = self.measure(reading.stamp, position), np.array(position[:2])
+        if gap > self.most:
+            # The arm would leap to where it was sent once it can.
+            self._rest_at(place + self._ahead * (self.most / gap))
+        self.brake()
+        velocity = self._config.mounting.rotate_to_table(reading.velocity)[:2]
+        rests = self.shaper.at_rest and np.linalg.norm(velocity) < AT_REST
+        if rests and not self._settled:
+            self._settled = True
+            if gap > LEAST_GAP:
+                self._rest_at(place)
