@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.devices.rig_file import load_rig, save_rig
+from marl_airhockey.core.checks import build, check_fields
+from marl_airhockey.devices.rig_file import check_tags, load_rig, save_rig
 from marl_airhockey.devices.vision.colour import Colour
 from marl_airhockey.devices.vision.detector import Detector
 from marl_airhockey.devices.vision.lens import View
@@ -22,7 +23,7 @@ class HandRig:
     """Rig of a hand. Field frame: origin at the field's centre, x away from the person.
 
     Raises:
-        ValueError: The size of the field is not two positive lengths.
+        ValueError: A field has another type or is outside its range.
     """
 
     camera: str
@@ -45,8 +46,14 @@ class HandRig:
     """Date of the calibration"""
 
     def __post_init__(self) -> None:
-        if len(self.size) != 2 or not min(self.size) > 0.0:
-            raise ValueError(f"size: {self.size}; expected length and width, m")
+        check_fields(
+            self,
+            size=(0.05, 5),
+            radius=(0.005, 0.5),
+            height=(0, 0.5),
+            readout=(0, 0.1),
+        )
+        check_tags(self.tags)
 
     @property
     def known_tags(self) -> dict[int, Array]:
@@ -74,8 +81,6 @@ class HandRig:
         """
         given = load_rig(path, KIND)
         try:
-            view, paddle = View.from_json(given.pop("view")), given.pop("paddle")
-            size = tuple(float(x) for x in given.pop("size"))
-            return HandRig(view=view, paddle=Colour(**paddle), size=size, **given)  # type: ignore[arg-type]
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"{path}: {error} is missing or wrong") from error
+            return build(HandRig, given)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, fields
+import re
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from marl_airhockey.core.checks import build, check_fields
+from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.camera import LATENCY
-from marl_airhockey.devices.rig_file import load_rig, save_rig
-from marl_airhockey.devices.robot.config import DriverConfig, Pendant, check_pendant
+from marl_airhockey.devices.rig_file import check_tags, load_rig, save_rig
+from marl_airhockey.devices.robot.config import (
+    PAYLOADS,
+    DriverConfig,
+    Pendant,
+    check_pendant,
+    check_tool,
+)
 from marl_airhockey.devices.robot.filters import Smoothing
 from marl_airhockey.devices.robot.mounting import Mounting
 from marl_airhockey.devices.robot.shaper import MotionLimits
@@ -18,6 +28,8 @@ from marl_airhockey.devices.vision.colour import Colour
 from marl_airhockey.devices.vision.lens import View
 from marl_airhockey.types import Array
 
+LAB = re.compile(r"lab:\d+")
+"""Form of an operator that is a virtual lab"""
 LATEST = 0.2
 """Longest time until a stop begins, s, in the stopping distance that a rig reports"""
 
@@ -27,7 +39,8 @@ class Rig:
     """Rig: what the backend ``real`` needs to know about a table.
 
     Raises:
-        ValueError: The limits are too close to those at the pendant.
+        ValueError: A field has another type or is outside its range, or the limits are
+            too close to those at the pendant.
     """
 
     table: str
@@ -63,6 +76,15 @@ class Rig:
     """Date of the calibration"""
 
     def __post_init__(self) -> None:
+        check_fields(self, payload=PAYLOADS, latency=(0, 1), readout=(0, 0.1))
+        if self.table not in TABLES:
+            raise ValueError(f"table: {unknown_name('table', self.table, TABLES)}")
+        if self.operator != "person" and not LAB.fullmatch(self.operator):
+            raise ValueError(
+                f"operator: {self.operator!r}; expected person or lab:PORT"
+            )
+        check_tool(self.tool)
+        check_tags(self.tags)
         check_pendant(self.limits, self.pendant)
 
     def driver_config(self, reach: tuple[tuple[float, float], ...]) -> DriverConfig:
@@ -119,39 +141,6 @@ class Rig:
             ValueError: A field is missing or wrong; the message names it.
         """
         try:
-            return _rig(given)
-        except (KeyError, TypeError) as error:
-            raise ValueError(f"{path}: {error} is missing or wrong") from error
-
-
-def _smoothing(given: Any) -> Smoothing:
-    """Return the filter of a file; older files hold only the time of a low pass."""
-    if isinstance(given, dict):
-        return Smoothing(**given)
-    return Smoothing("low_pass", float(given)) if given else Smoothing()
-
-
-def _rig(given: dict[str, Any]) -> Rig:
-    mounting = dict(given["mounting"])
-    rotation = tuple(tuple(row) for row in mounting["rotation"])
-    own = {"view", "mounting", "puck", "paddle"}
-    plain = {f.name for f in fields(Rig)} - own
-    parts = {name: given[name] for name in plain & given.keys()}
-    parts["tool"] = tuple(parts["tool"])
-    parts["limits"] = MotionLimits(**parts["limits"])
-    parts["pendant"] = Pendant(**parts["pendant"])
-    parts["smoothing"] = _smoothing(parts.get("smoothing", {}))
-    paddle = given.get("paddle")
-    return Rig(
-        view=View.from_json(given["view"]),
-        mounting=Mounting(
-            tuple(mounting["origin"]),
-            rotation,
-            tuple(mounting["tool"]),
-            mounting["residual"],
-            mounting["points"],
-        ),
-        puck=Colour(**given["puck"]),
-        paddle=None if paddle is None else Colour(**paddle),
-        **parts,
-    )
+            return build(Rig, given)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None

@@ -69,5 +69,19 @@ def rig_fields(path: Path, given: Any, kind: str) -> dict[str, Any]:
     return dict(given)
 
 
+def check_tags(tags: Mapping[str, list[list[float]]]) -> None:
+    """Refuse tags that are not four corners (4, 2), m, by a number.
+
+    Raises:
+        ValueError: They are not.
+    """
+    for number, corners in tags.items():
+        if not number.isdecimal() or np.shape(corners) != (4, 2):
+            raise ValueError(
+                f"tags: {number!r}: {corners}; expected a number and four corners, x "
+                "and y, m"
+            )
+
+
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else str(value)

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +193,6 @@ def test_a_caller_that_is_killed_leaves_nothing_behind(lab, tmp_path):
     assert wait_for(lambda: not runs(driver))
 
 
-def test_no_arm_is_no_traceback():
+def test_no_arm_is_no_traceback(lab):
     with pytest.raises(RobotError, match="no arm answers"):
-        Robot(DriverConfig("127.0.0.99", None, ())).connect()
+        Robot(replace(config_of(lab), host="127.0.0.99")).connect()

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from marl_airhockey.core.checks import check_fields
 from marl_airhockey.devices.robot.filters import Smoothing
 from marl_airhockey.devices.robot.mounting import Mounting
 from marl_airhockey.devices.robot.shaper import MotionLimits
 
+PAYLOADS = 0.0, 5.0
+"""Masses that a UR5e may carry, kg"""
+TURN = 2.0 * np.pi
+"""Largest component of a rotation vector, rad"""
 SHARE = 0.7
 """Largest fraction of the pendant's limits that motion may use"""
 
@@ -23,6 +30,41 @@ class Pendant:
     """Speed of the tool, m/s"""
     force: float = 150.0
     """Force on the tool, N"""
+
+    def __post_init__(self) -> None:
+        check_fields(self, speed=(0.01, 10), force=(1, 500))
+
+
+def check_tool(tool: tuple[float, ...]) -> None:
+    """Refuse a pose of the paddle in the flange's frame that no tool has.
+
+    Raises:
+        ValueError: It is none.
+    """
+    if (
+        len(tool) != 6
+        or max(map(abs, tool[:3])) > 1.0
+        or max(map(abs, tool[3:])) > TURN
+    ):
+        raise ValueError(
+            f"tool: {tool}; expected x, y, z, at most 1 m each, and a rotation vector, "
+            "rad"
+        )
+
+
+def check_polygon(reach: tuple[tuple[float, float], ...]) -> None:
+    """Refuse a reach that is no convex polygon.
+
+    Raises:
+        ValueError: It is none.
+    """
+    corners = np.array(reach)
+    if len(corners) < 3:
+        raise ValueError(f"reach: {len(corners)} corners; expected at least 3")
+    edges = np.roll(corners, -1, 0) - corners
+    after = np.roll(edges, -1, 0)
+    if (edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]).min() < 0.0:
+        raise ValueError("reach: expected a convex polygon, counter-clockwise")
 
 
 def check_pendant(limits: MotionLimits, pendant: Pendant) -> None:
@@ -56,13 +98,25 @@ class ServoSettings:
     paddle covers it at its speed limit, s. A UR5e needs 0.066 s. An arm that closes a
     gap of 0.087 s reaches the speed limit, so a larger one could make it leap."""
 
+    def __post_init__(self) -> None:
+        # The first two: what the controller takes.
+        check_fields(
+            self,
+            look_ahead=(0.03, 0.2),
+            gain=(100, 2000),
+            force=(0, 50),
+            compliance=(0.001, 2),
+            deviation=(0.001, 5),
+        )
+
 
 @dataclass(frozen=True)
 class DriverConfig:
     """Configuration of a driver.
 
     Raises:
-        ValueError: Limits above what the pendant's leave room for.
+        ValueError: A field has another type or is outside its range, the reach is no
+            convex polygon, or limits are above what the pendant's leave room for.
     """
 
     host: str
@@ -81,6 +135,9 @@ class DriverConfig:
     pendant: Pendant = field(default_factory=Pendant)
 
     def __post_init__(self) -> None:
+        check_fields(self, reach=(-3, 3), payload=PAYLOADS)
+        check_tool(self.tool)
+        check_polygon(self.reach)
         check_pendant(self.limits, self.pendant)
 
 

@@ -14,6 +14,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from marl_airhockey.core.checks import check_fields
+from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.types import Array
 
 
@@ -158,7 +160,7 @@ class Smoothing:
     """Choice of a filter.
 
     Raises:
-        ValueError: An unknown name, or a negative time.
+        ValueError: An unknown name, or a time that is not 0 to 1 s.
     """
 
     name: str = "none"
@@ -167,12 +169,9 @@ class Smoothing:
     """Its time, s"""
 
     def __post_init__(self) -> None:
+        check_fields(self, time=(0.0, 1.0))
         if self.name not in FILTERS:
-            raise ValueError(
-                f"smoothing: unknown filter {self.name!r}; there are: {[*FILTERS]}"
-            )
-        if not (np.isfinite(self.time) and self.time >= 0.0):
-            raise ValueError(f"smoothing: time {self.time!r} must be 0 s or more")
+            raise ValueError("name: " + unknown_name("filter", self.name, FILTERS))
 
     def make(self, dt: float) -> Filter:
         """Return the filter.

@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
 
+from marl_airhockey.core.checks import check_fields
 from marl_airhockey.devices.robot.kinematics import matrix_of, vector_of
 from marl_airhockey.types import Array
+
+TURN = 2.0 * np.pi
+"""Largest component of a rotation vector, rad"""
+STEEP = 45.0
+"""Largest angle between the table's normal and the z axis of the base, deg"""
+OBLIQUE = 10.0
+"""Largest angle between the tool's z axis and the way into the table, deg"""
 
 
 @dataclass(frozen=True)
 class Mounting:
-    """Pose of the table and orientation of the tool, base frame of a robot."""
+    """Pose of the table and orientation of the tool, base frame of a robot.
+
+    Raises:
+        ValueError: The rotation is none, the table does not face up, or the tool does
+            not point into the table.
+    """
 
     origin: tuple[float, float, float]
     """Table's centre, base frame, m"""
@@ -25,12 +39,41 @@ class Mounting:
     """Root mean square error of the fit, m"""
     points: int = 0
     """Number of points of the fit"""
-    _origin: Array = field(init=False, repr=False, compare=False)
-    _rotation: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_origin", np.array(self.origin))
-        object.__setattr__(self, "_rotation", np.array(self.rotation))
+        check_fields(self, origin=(-3, 3), tool=(-TURN, TURN), residual=(0, 1))
+        self._check_handedness()
+
+    @cached_property
+    def _origin(self) -> Array:
+        return np.array(self.origin, float)
+
+    @cached_property
+    def _rotation(self) -> Array:
+        return np.array(self.rotation, float)
+
+    def _check_handedness(self) -> None:
+        """Refuse a mirrored or upside-down table, and a tool that is not above it."""
+        rotation = self._rotation
+        off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        if off > 1e-3 or np.linalg.det(rotation) < 0.0:
+            raise ValueError(
+                f"rotation: {self.rotation}; expected a right-handed rotation matrix, "
+                "with columns of length 1 at right angles"
+            )
+        lean = np.degrees(np.arccos(np.clip(rotation[2, 2], -1.0, 1.0)))
+        if lean > STEEP:
+            raise ValueError(
+                f"rotation: the table's normal is {lean:.0f} deg away from the base's "
+                f"z; expected at most {STEEP:.0f}"
+            )
+        into = matrix_of(np.array(self.tool, float))[:, 2]
+        off = np.degrees(np.arccos(np.clip(-into @ rotation[:, 2], -1.0, 1.0)))
+        if off > OBLIQUE:
+            raise ValueError(
+                f"tool: its z is {off:.0f} deg away from the way into the table; "
+                f"expected at most {OBLIQUE:.0f}"
+            )
 
     @classmethod
     def of(

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from marl_airhockey.core.checks import check_fields
 from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.types import Array
 
@@ -33,7 +34,7 @@ class MotionLimits:
     """Limits of a paddle's motion.
 
     Raises:
-        ValueError: A limit is not a finite number above 0.
+        ValueError: A limit is not a finite number in its range.
     """
 
     speed: float = 0.7
@@ -44,9 +45,7 @@ class MotionLimits:
     """m/s3: a reversal of the acceleration in a control step of 50 ms"""
 
     def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name}: {value!r} must be a number above 0")
+        check_fields(self, speed=(1e-3, 10), acceleration=(0.01, 1e3), jerk=(0.1, 1e7))
 
     @property
     def stopping_distance(self) -> float:

@@ -8,6 +8,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
+from marl_airhockey.core.checks import check_fields
 from marl_airhockey.types import Array
 
 HUES = 180
@@ -18,7 +19,11 @@ FAINT = 0.2
 
 @dataclass(frozen=True)
 class Colour:
-    """Range of colours, by hue, saturation and brightness."""
+    """Range of colours, by hue, saturation and brightness.
+
+    Raises:
+        ValueError: A field is outside its range.
+    """
 
     hue: float
     """Centre of the range, 0 .. 180; red is at both ends"""
@@ -28,6 +33,12 @@ class Colour:
     """Least saturation, 0 .. 255"""
     brightness: int = 60
     """Least brightness, 0 .. 255"""
+
+    def __post_init__(self) -> None:
+        byte = (0, 255)
+        check_fields(
+            self, hue=(0, HUES), width=(0, HUES), saturation=byte, brightness=byte
+        )
 
     def mask(self, image: Array) -> Array:
         """Return (H, W) uint8, 255 where an image (H, W, 3) has this colour."""

@@ -5,20 +5,23 @@ Only points are transformed, not images, which is as exact and takes microsecond
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import cv2
 import numpy as np
 
+from marl_airhockey.core.checks import check_fields
 from marl_airhockey.types import Array
 
 
 @dataclass(frozen=True)
 class Lens:
-    """Lens of a camera."""
+    """Lens of a camera.
+
+    Raises:
+        ValueError: A field is wrong, or the matrix is no camera's.
+    """
 
     matrix: tuple[tuple[float, float, float], ...]
     """(3, 3) camera matrix, px"""
@@ -29,6 +32,15 @@ class Lens:
     residual: float = 0.0
     """Root mean square error of the calibration, px"""
 
+    def __post_init__(self) -> None:
+        check_fields(self, size=(16, 16384), distortion=(-1e3, 1e3), residual=(0, 100))
+        (fx, skew, _), (zero, fy, _), last = self.matrix
+        if min(fx, fy) <= 0.0 or (skew, zero, *last) != (0.0, 0.0, 0.0, 0.0, 1.0):
+            raise ValueError(
+                f"matrix: {self.matrix}; expected [[fx, 0, cx], [0, fy, cy], [0, 0, "
+                "1]], fx and fy above 0"
+            )
+
     @cached_property
     def arrays(self) -> tuple[Array, Array]:
         """Camera matrix and distortion."""
@@ -37,7 +49,11 @@ class Lens:
 
 @dataclass(frozen=True)
 class View:
-    """View of a table by a fixed camera."""
+    """View of a table by a fixed camera.
+
+    Raises:
+        ValueError: A field is wrong, or the camera is below the table.
+    """
 
     lens: Lens
     rotation: tuple[float, float, float]
@@ -47,20 +63,13 @@ class View:
     residual: float = 0.0
     """Root mean square error of the calibration, px"""
 
-    @staticmethod
-    def from_json(given: Mapping[str, Any]) -> View:
-        """Return the view of a JSON object, as `dataclasses.asdict` makes it.
-
-        Raises:
-            KeyError: A field is missing.
-            TypeError: A field is unknown, or has another type.
-        """
-        view = dict(given)
-        lens = dict(view.pop("lens"))
-        matrix = tuple(tuple(row) for row in lens.pop("matrix"))
-        lens = {k: tuple(v) if isinstance(v, list) else v for k, v in lens.items()}
-        vector, shift = tuple(view.pop("rotation")), tuple(view.pop("translation"))
-        return View(Lens(matrix=matrix, **lens), vector, shift, **view)
+    def __post_init__(self) -> None:
+        check_fields(self, rotation=(-10, 10), translation=(-20, 20), residual=(0, 100))
+        if self.centre[2] <= 0.0:
+            raise ValueError(
+                f"translation: the camera is {-self.centre[2]:.2f} m below the table; "
+                "expected above it"
+            )
 
     @cached_property
     def _pose(self) -> tuple[Array, Array]:
