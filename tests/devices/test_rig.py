@@ -101,7 +101,11 @@ BROKEN = [
     ("tool", [0.0, 0.0, 120.0, 0.0, 0.0, 0.0], "tool: .*at most 1 m"),
     ("mounting.rotation", MIRRORED, "mounting.rotation: .*right-handed"),
     ("mounting.rotation", UPSIDE_DOWN, "normal is 17.* deg away from the base's z"),
-    ("mounting.rotation", [[1.0, 0.0], [0.0, 1.0]], r"mounting.rotation.0.: .*3 values"),
+    (
+        "mounting.rotation",
+        [[1.0, 0.0], [0.0, 1.0]],
+        r"rotation.0.: .*3 values",
+    ),
     ("mounting.tool", [0.0, 0.0, 0.0], "mounting.tool: its z is 17.* deg away"),
     ("mounting.tool", [1.57, 0.0, 0.0], "mounting.tool: its z is 9.* deg away"),
     ("mounting.origin", [590.0, 0.0, 55.0], "mounting.origin.*from -3 to 3"),

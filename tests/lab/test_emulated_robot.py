@@ -17,8 +17,9 @@ from marl_airhockey.devices.robot import (
     Smoothing,
 )
 from marl_airhockey.lab.emulated_robot import EmulatedRobot
-from marl_airhockey.lab.ur_controller.arm import JOINT_ACCELERATION, Safety
+from marl_airhockey.lab.ur_controller.arm import JOINT_ACCELERATION
 from marl_airhockey.lab.ur_controller.plant import PlantReading
+from marl_airhockey.lab.ur_controller.safety import Safety
 
 STEP = 0.05
 UP = np.array([0.0, 0.5])

@@ -181,7 +181,7 @@ def test_an_arm_whose_tool_is_turned_is_not_snapped_back(degrees, fault):
     )
     robot.start_driver()
     assert robot.fault is fault
-    assert robot.get_observation().turned == pytest.approx(
+    assert robot.get_observation().misalignment == pytest.approx(
         np.radians(degrees), abs=1e-3
     )
 

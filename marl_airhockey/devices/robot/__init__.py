@@ -22,8 +22,9 @@ from marl_airhockey.devices.robot.mailbox import (
     Transition,
 )
 from marl_airhockey.devices.robot.mounting import Mounting
-from marl_airhockey.devices.robot.robot import Robot, RobotError
+from marl_airhockey.devices.robot.robot import Robot
 from marl_airhockey.devices.robot.shaper import MotionLimits, Shaper
+from marl_airhockey.devices.robot.start import RobotError
 
 __all__ = [
     "FILTERS",

@@ -13,7 +13,7 @@ from marl_airhockey.devices.robot.shaper import MotionLimits
 
 PAYLOADS = 0.0, 5.0
 """Masses that a UR5e may carry, kg"""
-TURN = 2.0 * np.pi
+FULL_ROTATION = 2.0 * np.pi
 """Largest component of a rotation vector, rad"""
 SHARE = 0.7
 """Largest fraction of the pendant's limits that motion may use"""
@@ -44,7 +44,7 @@ def check_tool(tool: tuple[float, ...]) -> None:
     if (
         len(tool) != 6
         or max(map(abs, tool[:3])) > 1.0
-        or max(map(abs, tool[3:])) > TURN
+        or max(map(abs, tool[3:])) > FULL_ROTATION
     ):
         raise ValueError(
             f"tool: {tool}; expected x, y, z, at most 1 m each, and a rotation vector, "

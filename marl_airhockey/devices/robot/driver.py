@@ -43,7 +43,7 @@ OVERRUN = 0.1
 NEW_PROCESS = (Fault.ROBOT_SILENT, Fault.CONNECTION_LOST)
 """Faults after which a driver ends and must be started again: its client would connect
 and send its script again for ever"""
-TURNED = 0.05
+MISALIGNED = 0.05
 """Angle between the tool and its orientation on the table at which an arm is not at
 the table, rad"""
 
@@ -91,8 +91,8 @@ class Driver:
         corners = tuple((float(x), float(y)) for x, y in self._config.reach)
         normals, offsets = half_planes(corners)
         outside = -float((normals @ place + offsets).min())
-        turned = self._config.mounting.turned(reading.pose)
-        return outside < AWAY and -LIFTED < height < AWAY and turned < TURNED
+        misalignment = self._config.mounting.misalignment(reading.pose)
+        return outside < AWAY and -LIFTED < height < AWAY and misalignment < MISALIGNED
 
     @property
     def is_over(self) -> bool:
@@ -232,7 +232,7 @@ class Driver:
             cycles=self._cycles,
             late=self._late,
             refused=self._refused,
-            turned=mounting.turned(reading.pose),
+            misalignment=mounting.misalignment(reading.pose),
             speed_scaling=self._motion.scaling,
             braked_at=self.supervisor.braked_at,
         )

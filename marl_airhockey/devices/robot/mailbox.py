@@ -91,7 +91,7 @@ class RobotObservation(NamedTuple):
     wrist_1: float
     wrist_2: float
     wrist_3: float
-    turned: float
+    misalignment: float
     """Angle between the tool and its orientation on the table, rad"""
     speed_scaling: float
     """Fraction of the speed limit that the speed slider leaves"""

@@ -12,7 +12,7 @@ from marl_airhockey.core.checks import check_fields
 from marl_airhockey.devices.robot.kinematics import matrix_of, vector_of
 from marl_airhockey.types import Array
 
-TURN = 2.0 * np.pi
+FULL_ROTATION = 2.0 * np.pi
 """Largest component of a rotation vector, rad"""
 STEEP = 45.0
 """Largest angle between the table's normal and the z axis of the base, deg"""
@@ -41,7 +41,9 @@ class Mounting:
     """Number of points of the fit"""
 
     def __post_init__(self) -> None:
-        check_fields(self, origin=(-3, 3), tool=(-TURN, TURN), residual=(0, 1))
+        check_fields(
+            self, origin=(-3, 3), tool=(-FULL_ROTATION, FULL_ROTATION), residual=(0, 1)
+        )
         self._check_handedness()
 
     @cached_property
@@ -115,7 +117,7 @@ class Mounting:
         """Return the position (3,), table frame, m, of a pose (6,), base frame."""
         return np.asarray((np.asarray(pose)[:3] - self._origin) @ self._rotation)
 
-    def turned(self, pose: Array) -> float:
+    def misalignment(self, pose: Array) -> float:
         """Return the angle of a pose (6,) from the orientation on the table, rad."""
         here, there = (matrix_of(np.array(v, float)) for v in (pose[3:], self.tool))
         return float(np.linalg.norm(vector_of(np.ascontiguousarray(here @ there.T))))

@@ -14,8 +14,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from marl_airhockey.devices.robot.config import DriverConfig
-from marl_airhockey.devices.robot.driver import NEW_PROCESS, TURNED
-from marl_airhockey.devices.robot.limits import check_reach, read_limits
+from marl_airhockey.devices.robot.driver import NEW_PROCESS
 from marl_airhockey.devices.robot.mailbox import (
     DriverState,
     Fault,
@@ -25,8 +24,12 @@ from marl_airhockey.devices.robot.mailbox import (
     Transition,
 )
 from marl_airhockey.devices.robot.process import run_driver
-from marl_airhockey.devices.robot.supervisor import AWAY, LIFTED
-from marl_airhockey.devices.robot.ur5e import check_controller
+from marl_airhockey.devices.robot.start import (
+    EMERGENCY,
+    RobotError,
+    check_arm,
+    start_failure,
+)
 from marl_airhockey.types import Array
 
 START = 30.0
@@ -39,11 +42,6 @@ SLOW = 0.25
 """Speed at which a paddle is moved to a position, m/s"""
 NEAR = 0.004
 """Distance from a position that counts as there, m"""
-EMERGENCY = "robot: emergency stop; release it at the pendant, then start again"
-
-
-class RobotError(RuntimeError):
-    """Error of a robot that does not do what it was commanded."""
 
 
 class Robot:
@@ -93,7 +91,7 @@ class Robot:
                 come to its limits in the reach, it is somewhere else than at the table,
                 or it is in an emergency stop.
         """
-        self._check()
+        check_arm(self.config)
         memory = Mailbox.allocate()
         self._box, self._enabled = Mailbox(memory), 0.0
         context = multiprocessing.get_context("spawn")
@@ -106,43 +104,11 @@ class Robot:
             if not self._process.is_alive():
                 break
             time.sleep(0.01)
-        observation, fault = self.get_observation(), self.fault
-        if self.state is DriverState.READY or fault is Fault.PROTECTIVE_STOP:
+        observation = self.get_observation()
+        if self.state is DriverState.READY or self.fault is Fault.PROTECTIVE_STOP:
             return
         self.disconnect()
-        if fault is Fault.EMERGENCY_STOP:
-            raise RobotError(EMERGENCY)
-        if fault is Fault.NOT_AT_TABLE:
-            x, y, z = observation.x, observation.y, observation.z
-            raise RobotError(
-                f"robot at {self.config.host}: the tool is at x {x:+.2f}, y {y:+.2f}, "
-                f"z {z:+.3f} m of the table, turned by "
-                f"{np.degrees(observation.turned):.0f} deg; expected over its reach, "
-                f"z {-LIFTED} to {AWAY} m, turned by at most "
-                f"{np.degrees(TURNED):.0f} deg; move it there by hand, or calibrate "
-                "the mounting again"
-            )
-        raise RobotError(
-            f"robot at {self.config.host}: its program did not start; does another "
-            "client control it?"
-        )
-
-    def _check(self) -> None:
-        """Refuse a controller, and a reach in which joints come to their limits."""
-        config = self.config
-        try:
-            check_controller(config.host)
-            joints = read_limits(config.host)
-            check_reach(
-                *(joints, config.mounting, np.array(config.tool)),
-                *(np.array(config.reach), config.limits.speed),
-            )
-        except OSError as error:
-            raise RobotError(
-                f"robot at {config.host}: its state cannot be read: {error}"
-            ) from error
-        except (RuntimeError, ValueError) as error:
-            raise RobotError(str(error)) from error
+        raise RobotError(start_failure(self.config.host, observation))
 
     @property
     def _mailbox(self) -> Mailbox:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass, field
-from enum import IntEnum
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from marl_airhockey.lab.ur_controller.motions import (
     Speed,
 )
 from marl_airhockey.lab.ur_controller.plant import Plant
+from marl_airhockey.lab.ur_controller.safety import Safety
 from marl_airhockey.types import Array
 
 DT = 0.002
@@ -45,22 +45,6 @@ FORCE_DAMPING = 100.0
 SCALING_RATE = 4.0
 """Change of the speed scaling per second after the speed slider has moved: 1 to 0 in
 0.25 s"""
-
-
-class Safety(IntEnum):
-    """Safety mode, as the controller's protocol numbers it."""
-
-    NORMAL = 1
-    PROTECTIVE_STOP = 3
-    ROBOT_EMERGENCY_STOP = 7
-
-
-SAFETY_BITS = {
-    Safety.NORMAL: 1 << 0,
-    Safety.PROTECTIVE_STOP: 1 << 2,
-    Safety.ROBOT_EMERGENCY_STOP: (1 << 6) | (1 << 7),
-}
-"""Bits of ``safety_status_bits``"""
 
 
 @dataclass

@@ -11,8 +11,9 @@ from sys import stderr
 from typing import Any
 
 from marl_airhockey.devices.robot.kinematics import pose_vector
-from marl_airhockey.lab.ur_controller.arm import DT, SAFETY_BITS, Arm, Safety
+from marl_airhockey.lab.ur_controller.arm import DT, Arm
 from marl_airhockey.lab.ur_controller.rtde import Recipe
+from marl_airhockey.lab.ur_controller.safety import SAFETY_BITS, Safety
 from marl_airhockey.lab.ur_controller.script import ControlScript
 
 VERSION = (5, 12, 2, 1101534)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.lab.ur_controller.arm import Safety
 from marl_airhockey.lab.ur_controller.controller import Controller
 from marl_airhockey.lab.ur_controller.plant import EmptyTable
+from marl_airhockey.lab.ur_controller.safety import Safety
 
 RAISED = 0.006
 """Height of the body under the paddle, m"""

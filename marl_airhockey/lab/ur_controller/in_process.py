@@ -15,10 +15,11 @@ import numpy as np
 from marl_airhockey.devices.robot.arm import ArmFault, Reading
 from marl_airhockey.devices.robot.config import ServoSettings
 from marl_airhockey.devices.robot.ur5e import STOP, WATCHDOG
-from marl_airhockey.lab.ur_controller.arm import DT, Safety
+from marl_airhockey.lab.ur_controller.arm import DT
 from marl_airhockey.lab.ur_controller.controller import PLAYING, Controller
 from marl_airhockey.lab.ur_controller.dashboard import LOCKED
 from marl_airhockey.lab.ur_controller.rtde import Recipe
+from marl_airhockey.lab.ur_controller.safety import Safety
 from marl_airhockey.types import Array
 
 COMMAND = "input_int_register_0"

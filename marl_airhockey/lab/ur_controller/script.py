@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator
 import numpy as np
 
 from marl_airhockey.devices.robot.kinematics import forward, pose_of, pose_vector
-from marl_airhockey.lab.ur_controller.arm import DT, Arm, Safety
+from marl_airhockey.lab.ur_controller.arm import DT, Arm
 from marl_airhockey.lab.ur_controller.motions import (
     Force,
     Halt,
@@ -23,6 +23,7 @@ from marl_airhockey.lab.ur_controller.motions import (
     Motion,
     Speed,
 )
+from marl_airhockey.lab.ur_controller.safety import Safety
 from marl_airhockey.types import Array
 
 READY, DONE = 1, 2
