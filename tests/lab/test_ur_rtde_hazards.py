@@ -4,6 +4,7 @@ The real client talks to the emulator in a process of its own.
 """
 
 import json
+import socket
 import threading
 import time
 
@@ -21,8 +22,10 @@ from marl_airhockey.devices.robot import (
 )
 from marl_airhockey.devices.robot.ur5e import Ur5e
 from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.lab.ur_controller.ports import SECONDARY
 
 pytest.importorskip("rtde_control")
+rtde_io = pytest.importorskip("rtde_io")
 SETUP = LabSetup()
 CONFIG = DriverConfig(ADDRESS, SETUP.mounting, SETUP.seat.reach)
 DT = 0.008
@@ -246,3 +249,61 @@ def test_an_arm_at_another_table_is_refused_and_does_not_move(running):
 
 def test_a_status_is_plain_json(running):
     assert json.loads(json.dumps(status()))["safety"] == "NORMAL"
+
+
+def test_a_second_robot_is_refused_and_the_first_continues(robot):
+    drive(robot, 0.2)
+    uploads = status()["uploads"]
+    with pytest.raises(RobotError, match="does another client control it"):
+        Robot(CONFIG).connect()
+    drive(robot, 0.3)
+    assert robot.state is DriverState.RUNNING
+    assert robot.get_observation().vy > 0.2
+    assert [change.fault for change in robot.transitions[-1:]] == [Fault.NONE]
+    assert status()["uploads"] == uploads
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["protective_stop", "dropped_connection"])
+def test_a_client_sends_no_program_after_a_fault(robot, fault):
+    drive(robot, 0.3)
+    switch(fault, "--address", ADDRESS)
+    assert until(lambda: robot.state is DriverState.FAULT, 1.0)
+    uploads = status()["uploads"]
+    switch(fault, "--off", "--address", ADDRESS)
+    time.sleep(3.0)
+    assert status()["uploads"] == uploads
+    assert status()["program"] == "stopped"
+    assert robot.state is DriverState.FAULT
+    robot.recover()
+    robot.go_to(SETUP.home)
+
+
+def test_a_program_of_another_client_is_a_fault(robot):
+    drive(robot, 0.3)
+    with socket.create_connection((ADDRESS, SECONDARY), 3.0) as link:
+        link.sendall(b"def other():\n  sleep(60)\nend\n")
+        assert until(lambda: robot.state is DriverState.FAULT, 1.0)
+    assert robot.fault is Fault.PROGRAM_LOST
+    assert until(lambda: status()["speed"] < 0.01, 1.0)
+    robot.recover()
+    robot.go_to(SETUP.home)
+
+
+@pytest.mark.slow
+def test_the_speed_slider_of_another_client_slows_the_robot(robot):
+    slider = rtde_io.RTDEIOInterface(ADDRESS)
+    assert slider.setSpeedSlider(0.2)
+    drive(robot, 0.6)
+    assert robot.state is DriverState.RUNNING
+    speeds = []
+    for _ in range(10):
+        drive(robot, 0.05)
+        speeds.append(robot.get_observation().vy)
+    assert 0.10 < max(speeds) < 0.16
+    assert slider.setSpeedSlider(1.0)
+    for _ in range(10):
+        drive(robot, 0.05, -UP)
+        speeds.append(abs(robot.get_observation().vy))
+    slider.disconnect()
+    assert max(speeds) < 1.03 * 0.3

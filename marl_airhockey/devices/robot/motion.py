@@ -46,6 +46,7 @@ class Motion:
         self.height = float(position[2])
         """Height of the sent position, m; a compliant arm does not follow it"""
         self._stamp, self._ahead = math.nan, np.zeros(2)
+        self._known = np.array(position[:2], float)
         self._rest_at(np.array(position[:2], float))
         self._settled = True
 
@@ -67,6 +68,7 @@ class Motion:
             stamp: Time of the measurement, of the robot's clock, s.
             position: (3,) m.
         """
+        self._known = np.array(position[:2], float)
         if stamp != self._stamp:
             # An old position is behind the arm, and not the arm behind its target.
             self._stamp, self._ahead = stamp, self.shaper.place - position[:2]
@@ -89,6 +91,8 @@ class Motion:
             left: Time until it is to be reached, s.
         """
         self._settled = False
+        if self._wait_for_arm():
+            return
         # A filter may overflow on a number that is finite.
         size = max(math.hypot(*velocity), 1e-12)
         fitted = velocity * min(1.0, self._config.limits.speed / size)
@@ -96,8 +100,20 @@ class Motion:
 
     def brake(self) -> None:
         """Move by a cycle toward rest."""
-        self.shaper.brake()
-        self._filter.reset(self.shaper.velocity)
+        if not self._wait_for_arm():
+            self.shaper.brake()
+            self._filter.reset(self.shaper.velocity)
+
+    def _wait_for_arm(self) -> bool:
+        """Stop where the arm could still be without a leap; return whether that is so.
+
+        An arm of which there is no news may have stopped where it was last.
+        """
+        place = self.shaper.place
+        too_far = float(np.linalg.norm(place - self._known)) > self.most
+        if too_far:
+            self._rest_at(place)
+        return too_far
 
     def come_to_rest(self, reading: Reading, position: Array) -> None:
         """Move by a cycle toward rest where the arm is.

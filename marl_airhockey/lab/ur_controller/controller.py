@@ -6,13 +6,13 @@ in emulated time.
 
 from __future__ import annotations
 
+import math
 import re
 from sys import stderr
 from typing import Any
 
 from marl_airhockey.devices.robot.kinematics import pose_vector
 from marl_airhockey.lab.ur_controller.arm import DT, Arm
-from marl_airhockey.lab.ur_controller.rtde import Recipe
 from marl_airhockey.lab.ur_controller.safety import SAFETY_BITS, Safety
 from marl_airhockey.lab.ur_controller.script import ControlScript
 
@@ -22,10 +22,18 @@ STOPPED, PLAYING = 1, 2
 """Runtime states"""
 RUNNING, POWER_OFF = 7, 3
 """Robot modes"""
+JOINT_RUNNING = 253
+"""Mode of a joint that moves as commanded"""
 SPACING = 4
 """Periods between two commands of a client that sends 125 a second"""
 OFFSET = re.compile(r"reg_offset_int\s*=\s*(?:#[^\n]*\n)?\s*(\d+)")
 """Place in the script of ur_rtde where the first of its registers is written"""
+PROGRAM = re.compile(r"^\s*(def|sec) \w+\(|reg_offset_int", re.MULTILINE)
+"""Beginning of a program"""
+REPLACING = 50
+"""Periods for which no program runs when one replaces another"""
+OFFSETS = 0, 24
+"""First registers that a script of ur_rtde may use"""
 STALL_EVERY = 250
 """Periods from one stall to the next, a fault"""
 UNLOCK_AFTER = 5.0
@@ -58,9 +66,16 @@ class Controller:
         self._stall_from = 0
         self.refuses = False
         """True if connections are closed and refused, a fault"""
+        self.forgets = False
+        """True if new connections get no data, a fault"""
+        self.first_after = 0.0
+        """Time after which a new connection gets its first data, a fault, s"""
+        self.uploads = 0
+        """Number of scripts that clients have sent"""
+        self._next_script: tuple[int, int] | None = None
         self._outputs = 0
         self._stopped_at = 0.0
-        self._pending: list[tuple[Recipe, bytes]] = []
+        self._pending: list[dict[str, Any]] = []
 
     @property
     def time(self) -> float:
@@ -68,11 +83,23 @@ class Controller:
         return self.ticks * DT
 
     def upload(self, text: str) -> None:
-        """Run a script that a client has sent."""
+        """Replace the running program by a script that a client has sent."""
+        if not (PROGRAM.search(text) and self.ready):
+            return
+        self.uploads += 1
+        waits = REPLACING if self.script.running else 0
+        self.script.kill()
         # Nothing else is run; this is what the script of ur_rtde begins with.
         found = OFFSET.search(text)
-        if found and self.ready:
-            self.script.start(int(found[1]))
+        if found and int(found[1]) in OFFSETS:
+            self._next_script = self.ticks + waits, int(found[1])
+            self._start_script()
+
+    def _start_script(self) -> None:
+        """Start the script that was sent last, once its time has come."""
+        if self._next_script and self.ticks >= self._next_script[0] and self.ready:
+            self.script.start(self._next_script[1])
+            self._next_script = None
 
     @property
     def ready(self) -> bool:
@@ -83,6 +110,7 @@ class Controller:
         """Switch the arm's power on or off; without it the brakes hold the arm."""
         self.powered = on
         if not on:
+            self._next_script = None
             self.script.kill()
 
     def stop(self, mode: Safety, why: str) -> None:
@@ -92,6 +120,7 @@ class Controller:
 
     def _note_stop(self) -> None:
         self._stopped_at = self.time
+        self._next_script = None
         self.script.kill()
         print(f"ur-emulator: {self.arm.safety.name}: {self.arm.stopped}", file=stderr)
 
@@ -114,9 +143,9 @@ class Controller:
         passed = self.ticks - self._stall_from
         return bool(self.stall) and passed % STALL_EVERY == 1
 
-    def take(self, recipe: Recipe, body: bytes) -> None:
-        """Keep what a client has written for the next period."""
-        self._pending.append((recipe, body))
+    def take(self, values: dict[str, Any]) -> None:
+        """Keep what a client has written, by name, for the next period."""
+        self._pending.append(values)
 
     def step(self, behind: bool = False) -> None:
         """Run for a period: inputs, script, arm, safety.
@@ -129,9 +158,10 @@ class Controller:
         # controller is never late; what piled up while this one was is taken as it
         # came, or the arm would be sent on a leap.
         count = len(self._pending) if not behind else int(self.ticks % SPACING == 0)
-        for recipe, body in self._pending[:count]:
-            self._write(recipe.unpack(body))
+        for values in self._pending[:count]:
+            self._write(values)
         del self._pending[:count]
+        self._start_script()
         self.script.step()
         safe = self.arm.safety
         self.arm.step()
@@ -147,10 +177,9 @@ class Controller:
                     self.script.silence = 0.0
             elif kind == "input_double_register":
                 self.script.inputs_double[int(index)] = value
-        if values.get("speed_slider_mask"):
-            self.arm.speed_fraction = min(
-                max(values["speed_slider_fraction"], 0.0), 1.0
-            )
+        slider = values.get("speed_slider_fraction", math.nan)
+        if values.get("speed_slider_mask") and math.isfinite(slider):
+            self.arm.speed_fraction = min(max(slider, 0.0), 1.0)
         mask = values.get("standard_digital_output_mask", 0)
         level = values.get("standard_digital_output", 0)
         self._outputs = (self._outputs & ~mask) | (level & mask)
@@ -184,6 +213,9 @@ class Controller:
             "speed_slider_fraction": arm.speed_fraction,
             "actual_digital_output_bits": self._outputs,
             "payload": arm.payload,
+            "tcp_offset": arm.tool,
+            "safety_status": int(arm.safety),
+            "joint_mode": JOINT_RUNNING,
             **{f"output_int_register_{i}": ints[i] for i in range(48)},
             **{f"output_double_register_{i}": doubles[i] for i in range(48)},
         }

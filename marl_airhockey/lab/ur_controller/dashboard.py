@@ -89,7 +89,9 @@ class Dashboard:
                     writer.write(b"Disconnected\n")
                     return
                 writer.write(f"{self.reply(line)}\n".encode())
-        except (ConnectionError, asyncio.CancelledError):
+                await writer.drain()
+        except (ConnectionError, asyncio.CancelledError, ValueError):
+            # A line without an end is a ValueError.
             return
         finally:
             writer.close()

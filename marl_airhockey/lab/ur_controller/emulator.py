@@ -72,6 +72,7 @@ def status_of(controller: Controller) -> dict[str, Any]:
         "safety": arm.safety.name,
         "stopped": arm.stopped,
         "program": "running" if script.running else "stopped",
+        "uploads": controller.uploads,
         "pose": [round(float(x), 5) for x in arm.reading.pose],
         "speed": round(float(np.linalg.norm(arm.twist[:3])), 5),
         "force": round(float(np.linalg.norm(arm.reading.force[:3])), 2),

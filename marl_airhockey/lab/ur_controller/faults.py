@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from marl_airhockey.lab.ur_controller.controller import Controller
+from marl_airhockey.lab.ur_controller.motions import JointLine
 from marl_airhockey.lab.ur_controller.plant import EmptyTable
 from marl_airhockey.lab.ur_controller.safety import Safety
 
@@ -17,6 +19,14 @@ DELAY = 0.1
 """Delay of delayed packets, s"""
 STALL = 0.08
 """Time for which a controller without real time does nothing, twice a second, s"""
+EXTRA_MASS, GRAVITY = 1.0, 9.81
+"""Mass that the pendant's payload lacks, kg, and what it is multiplied with, m/s2"""
+IMPATIENT = 0.04
+"""Time without a command after which an impatient program ends, s"""
+FIRST_AFTER = 1.0
+"""Time until the first data of a controller whose state comes late, s"""
+CARRIED = 0.3
+"""Angle by which a person turns the base of the arm, rad"""
 LAG = 4.0
 """Factor on the lag of an arm whose look-ahead is too long"""
 DRIFT = 6.0
@@ -86,6 +96,43 @@ def _drifting(controller: Controller, on: bool) -> None:
     controller.arm.force_drift = np.array([0.0, 0.0, DRIFT if on else 0.0, 0, 0, 0])
 
 
+def _overweight(controller: Controller, on: bool) -> None:
+    weight = GRAVITY * EXTRA_MASS if on else 0.0
+    controller.arm.force_drift = np.array([0.0, 0.0, weight, 0, 0, 0])
+
+
+def _stopped_slider(controller: Controller, on: bool) -> None:
+    controller.arm.speed_fraction = 0.0 if on else 1.0
+
+
+def _extrapolated(controller: Controller, on: bool) -> None:
+    controller.script.poses.extrapolates = on
+
+
+def _checked(controller: Controller, on: bool) -> None:
+    controller.script.poses.checks_speed = on
+
+
+def _impatient(controller: Controller, on: bool) -> None:
+    controller.script.longest_silence = IMPATIENT if on else math.inf
+
+
+def _forgetful(controller: Controller, on: bool) -> None:
+    controller.forgets = on
+
+
+def _late_state(controller: Controller, on: bool) -> None:
+    controller.first_after = FIRST_AFTER if on else 0.0
+
+
+def _carried(controller: Controller, on: bool) -> None:
+    if on:
+        # A person who moves the arm stops its program.
+        controller.script.kill()
+        moved = controller.arm.angles + np.array([CARRIED, 0, 0, 0, 0, 0])
+        controller.arm.motion = JointLine(moved, 0.5, 2.0)
+
+
 def _local(controller: Controller, on: bool) -> None:
     controller.remote = not on
 
@@ -114,6 +161,46 @@ FAULTS = {
         "the force sensor reports 6 N too much",
         _drifting,
         "Universal Robots forum 41657",
+    ),
+    "wrong_payload": Fault(
+        "the payload at the pendant is 1 kg too low",
+        _overweight,
+        "ros-industrial/universal_robot issue 102",
+    ),
+    "slider_at_zero": Fault(
+        "another client moves the speed slider to 0",
+        _stopped_slider,
+        "Universal_Robots_ROS_Driver issues 191 and 195",
+    ),
+    "extrapolated_poses": Fault(
+        "the controller extrapolates poses that come late",
+        _extrapolated,
+        "Universal_Robots_ROS2_Driver issue 534",
+    ),
+    "speed_check": Fault(
+        "a pose that calls for a joint above 180 deg/s ends the program",
+        _checked,
+        "Universal_Robots_Client_Library PR 273",
+    ),
+    "impatient_program": Fault(
+        "the program ends after 40 ms without a command",
+        _impatient,
+        "Universal_Robots_Client_Library issue 423",
+    ),
+    "forgotten_recipes": Fault(
+        "a client that connects again gets no data",
+        _forgetful,
+        "Universal_Robots_Client_Library PR 384",
+    ),
+    "late_state": Fault(
+        "the first data comes 1 s after a client has connected",
+        _late_state,
+        "ur_modern_driver issue 206",
+    ),
+    "carried_arm": Fault(
+        "a person stops the program and moves the arm away",
+        _carried,
+        "Universal_Robots_ROS2_Driver issue 800",
     ),
 }
 """Faults by name"""

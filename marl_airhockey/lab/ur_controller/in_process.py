@@ -18,7 +18,6 @@ from marl_airhockey.devices.robot.ur5e import STOP, WATCHDOG
 from marl_airhockey.lab.ur_controller.arm import DT
 from marl_airhockey.lab.ur_controller.controller import PLAYING, Controller
 from marl_airhockey.lab.ur_controller.dashboard import LOCKED
-from marl_airhockey.lab.ur_controller.rtde import Recipe
 from marl_airhockey.lab.ur_controller.safety import Safety
 from marl_airhockey.types import Array
 
@@ -32,10 +31,9 @@ FAULTS = {
 }
 
 
-def _registers(integers: int, doubles: int) -> Recipe:
+def _registers(integers: int, doubles: int) -> list[str]:
     names = [f"input_int_register_{i}" for i in range(integers)]
-    names += [f"input_double_register_{i}" for i in range(doubles)]
-    return Recipe(names)
+    return names + [f"input_double_register_{i}" for i in range(doubles)]
 
 
 SERVO, FORCE = _registers(1, 11), _registers(8, 18)
@@ -75,10 +73,9 @@ class InProcessArm:
         self.controller.upload(SCRIPT)
         self._set_watchdog()
 
-    def _send(self, recipe: Recipe, *numbers: float) -> None:
+    def _send(self, registers: list[str], *numbers: float) -> None:
         if not self.controller.refuses:
-            values = dict(zip(recipe.names, numbers, strict=True))
-            self.controller.take(recipe, recipe.pack(values))
+            self.controller.take(dict(zip(registers, numbers, strict=True)))
 
     def _command(self, number: int, argument: float = 0.0) -> None:
         """Run a command that is acknowledged."""

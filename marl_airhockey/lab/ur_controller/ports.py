@@ -30,6 +30,8 @@ BEHIND = 0.006
 PRESS_PLAY = 0.4
 """Time after which somebody at the pendant starts External Control for a client that
 has uploaded no script, s"""
+LONGEST_SCRIPT = 1 << 22
+"""Characters of a script beyond which its client is disconnected"""
 Handler = Callable[
     [asyncio.StreamReader, asyncio.StreamWriter], Coroutine[Any, Any, None]
 ]
@@ -47,6 +49,7 @@ class Ports:
         self.host = ""
         """Address at which it is served; "" before"""
         self._clients: set[RtdeConnection] = set()
+        self._owners: dict[str, RtdeConnection] = {}
         self._client_host = "127.0.0.1"
         self._tasks: set[asyncio.Task[None]] = set()
         self._handlers: dict[int, Handler] = {
@@ -79,6 +82,8 @@ class Ports:
             try:
                 await self._run()
             finally:
+                for task in self._tasks:
+                    task.cancel()
                 _close(servers)
         what = f"{hosts[0]}: a port" if len(hosts) == 1 else "every loopback address"
         ports = ", ".join(map(str, self._handlers))
@@ -116,7 +121,9 @@ class Ports:
         if self.controller.refuses:
             writer.close()
             return
-        client = RtdeConnection(self.controller, reader, writer, self._client_started)
+        client = RtdeConnection(
+            *(self.controller, reader, writer, self._owners, self._client_started)
+        )
         self._clients.add(client)
         try:
             await client.serve()
@@ -170,6 +177,8 @@ class Ports:
                 if text.rstrip().endswith("end"):
                     self.controller.upload(text)
                     text = ""
+                elif len(text) > LONGEST_SCRIPT:
+                    return
         except (ConnectionError, asyncio.CancelledError):
             return
         finally:

@@ -20,58 +20,97 @@ FORMATS = {
     "VECTOR6INT32": "6i",
 }
 """Format of `struct` by the name of a type"""
-UNKNOWN = "NOT_FOUND"
-"""Type of a name that there is not"""
+UNKNOWN, TAKEN = "NOT_FOUND", "IN_USE"
+"""Types of a name that there is not, and of an input that another client writes"""
+Types = dict[str, str]
+"""Types of variables by their names"""
 
-_NAMES = {
-    "VECTOR6D": """target_q target_qd target_qdd target_current target_moment actual_q
-        actual_qd actual_current actual_current_as_torque joint_control_output
-        actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose
-        target_TCP_speed joint_temperatures actual_joint_voltage ft_raw_wrench
-        payload_inertia external_force_torque""",
-    "VECTOR3D": "actual_tool_accelerometer payload_cog elbow_position elbow_velocity",
-    "VECTOR6INT32": "joint_mode",
-    "UINT32": """runtime_state robot_status_bits safety_status_bits
-        speed_slider_mask""",
-    "INT32": "robot_mode safety_mode",
-    "UINT64": "actual_digital_input_bits actual_digital_output_bits",
-    "UINT8": """standard_digital_output_mask standard_digital_output
-        standard_analog_output_mask standard_analog_output_type
-        configurable_digital_output_mask configurable_digital_output
-        tool_digital_output_mask tool_digital_output""",
-    "DOUBLE": """timestamp actual_execution_time speed_scaling target_speed_fraction
-        actual_momentum actual_main_voltage actual_robot_voltage actual_robot_current
-        standard_analog_input0 standard_analog_input1 standard_analog_output0
-        standard_analog_output1 payload speed_slider_fraction standard_analog_output_0
-        standard_analog_output_1""",
-}
-TYPES = {name: kind for kind, names in _NAMES.items() for name in names.split()}
-for _direction in ("input", "output"):
-    for _index in range(48):
-        TYPES[f"{_direction}_int_register_{_index}"] = "INT32"
-        TYPES[f"{_direction}_double_register_{_index}"] = "DOUBLE"
+
+def _types(names: dict[str, str], **registers: str) -> Types:
+    """Return the types of variables and of 48 registers each."""
+    found = {name: kind for kind, listed in names.items() for name in listed.split()}
+    for stem, kind in registers.items():
+        first = 64 if kind == "BOOL" else 0
+        count = 64 if kind == "BOOL" else 48
+        found |= {f"{stem}_{k}": kind for k in range(first, first + count)}
+    return found
+
+
+OUTPUTS = _types(
+    {
+        "VECTOR6D": """target_q target_qd target_qdd target_current target_moment
+            actual_q actual_qd actual_current actual_current_window
+            actual_current_as_torque joint_control_output actual_TCP_pose
+            actual_TCP_speed actual_TCP_force target_TCP_pose target_TCP_speed
+            joint_temperatures actual_joint_voltage ft_raw_wrench payload_inertia
+            tcp_offset""",
+        "VECTOR3D": """actual_tool_accelerometer payload_cog elbow_position
+            elbow_velocity""",
+        "VECTOR6INT32": "joint_mode",
+        "UINT32": """runtime_state robot_status_bits safety_status_bits analog_io_types
+            euromap67_input_bits euromap67_output_bits tool_mode
+            tool_analog_input_types script_control_line
+            output_bit_registers0_to_31 output_bit_registers32_to_63
+            input_bit_registers0_to_31 input_bit_registers32_to_63""",
+        "INT32": """robot_mode safety_mode safety_status tool_output_voltage
+            time_scale_source encoder0_raw encoder1_raw""",
+        "UINT64": "actual_digital_input_bits actual_digital_output_bits",
+        "UINT8": """tool_output_mode tool_digital_output0_mode
+            tool_digital_output1_mode""",
+        "DOUBLE": """timestamp actual_execution_time speed_scaling
+            target_speed_fraction actual_momentum actual_main_voltage
+            actual_robot_voltage actual_robot_current standard_analog_input0
+            standard_analog_input1 standard_analog_output0 standard_analog_output1
+            io_current euromap67_24V_voltage euromap67_24V_current tool_analog_input0
+            tool_analog_input1 tool_output_current tool_temperature tcp_force_scalar
+            payload joint_position_deviation_ratio collision_detection_ratio""",
+    },
+    output_bit_register="BOOL",
+    input_bit_register="BOOL",
+    output_int_register="INT32",
+    input_int_register="INT32",
+    output_double_register="DOUBLE",
+    input_double_register="DOUBLE",
+)
+"""Types of the variables that a controller sends"""
+INPUTS = _types(
+    {
+        "UINT32": """speed_slider_mask input_bit_registers0_to_31
+            input_bit_registers32_to_63""",
+        "UINT8": """standard_digital_output_mask standard_digital_output
+            configurable_digital_output_mask configurable_digital_output
+            tool_digital_output_mask tool_digital_output standard_analog_output_mask
+            standard_analog_output_type""",
+        "DOUBLE": """speed_slider_fraction standard_analog_output_0
+            standard_analog_output_1""",
+        "VECTOR6D": "external_force_torque",
+    },
+    input_bit_register="BOOL",
+    input_int_register="INT32",
+    input_double_register="DOUBLE",
+)
+"""Types of the variables that a client may write"""
 
 
 class Recipe:
     """List of variables that a package of data holds, one after the other.
 
     Args:
-        names: of the variables.
+        text: Names of the variables, separated by commas.
+        known: Types of the variables that there are.
+
+    Raises:
+        UnicodeDecodeError: The text is no text.
     """
 
-    def __init__(self, names: list[str]) -> None:
-        self.names = names
-        self.types = [TYPES.get(name, UNKNOWN) for name in names]
+    def __init__(self, text: bytes, known: Types) -> None:
+        self.names = [name for name in text.decode().split(",") if name]
+        self.types = [known.get(name, UNKNOWN) for name in self.names]
         self.known = UNKNOWN not in self.types
         """True if there are all of them."""
         formats = [FORMATS[kind] for kind in self.types] if self.known else []
         self._format = struct.Struct(">" + "".join(formats))
         self._sizes = [int(f[0]) if len(f) > 1 else 1 for f in formats]
-
-    @staticmethod
-    def parse(text: bytes) -> Recipe:
-        """Read a list of names, which may end with a comma."""
-        return Recipe([name for name in text.decode().split(",") if name])
 
     def pack(self, values: dict[str, Any]) -> bytes:
         """Write values by name; those that are missing are 0."""
@@ -102,3 +141,10 @@ class Recipe:
 def package(kind: int, body: bytes) -> bytes:
     """Return a package of a type."""
     return struct.pack(">HB", len(body) + 3, kind) + body
+
+
+def text_message(text: str) -> bytes:
+    """Return the package by which a controller reports an error to a client."""
+    words, source = text.encode()[:255], b"RTDE"
+    body = bytes([len(words)]) + words + bytes([len(source)]) + source + b"\x00"
+    return package(ord("M"), body)

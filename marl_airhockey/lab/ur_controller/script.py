@@ -7,6 +7,7 @@ with the registers is done by `ControlScript`, once in every period of the contr
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Generator
 
@@ -21,8 +22,10 @@ from marl_airhockey.lab.ur_controller.motions import (
     JointSpeed,
     Line,
     Motion,
+    Servo,
     Speed,
 )
+from marl_airhockey.lab.ur_controller.poses import Poses
 from marl_airhockey.lab.ur_controller.safety import Safety
 from marl_airhockey.types import Array
 
@@ -33,8 +36,16 @@ EXIT = 255
 DEAD_TIME = 0.004
 """Part of the half-rise of `servoL` that no look-ahead explains: of 34 ms at a
 look-ahead of 0.03 s on the arm's relatives, s"""
+LOOK_AHEAD = 0.03, 0.2
+"""Least and largest look-ahead that `servoL` takes, s"""
+LARGEST = 1e6
+"""Largest argument of a command that makes sense"""
 Waiting = Generator[None, None, None]
 """Command that takes several periods"""
+
+
+class ScriptError(Exception):
+    """Error of a running script, which ends it."""
 
 
 class ControlScript:
@@ -56,6 +67,9 @@ class ControlScript:
         silence of its client's."""
         self.offset = 0
         """First of the registers that the script uses: 0, or 24 for the upper range."""
+        self.poses = Poses()
+        self.longest_silence = math.inf
+        """Time without a command that ends the script, whatever its watchdog, s"""
         self._run: Waiting | None = None
         self._watchdog = 0.0
         """Least rate of commands, Hz; 0 without a watchdog"""
@@ -116,12 +130,14 @@ class ControlScript:
     def step(self) -> None:
         """Run for a period of the controller."""
         self.silence += DT
-        if self._watchdog and self.silence > 1.0 / self._watchdog:
+        patience = 1.0 / self._watchdog if self._watchdog else math.inf
+        if self.silence > min(patience, self.longest_silence):
             self.kill()
         if self._run is not None:
             try:
                 next(self._run)
-            except StopIteration:
+            except (StopIteration, ScriptError):
+                # An error ends a script; its client is not told.
                 self.kill()
 
     def _loop(self) -> Waiting:
@@ -153,30 +169,43 @@ class ControlScript:
 
     def _six(self, first: int = 0) -> Array:
         first += self.offset
-        return self.inputs_double[first : first + 6].copy()
+        return _checked(self.inputs_double[first : first + 6].copy())
 
     def _number(self, index: int) -> float:
-        return float(self.inputs_double[self.offset + index])
+        first = self.offset + index
+        return float(_checked(self.inputs_double[first : first + 1])[0])
+
+    def _positive(self, index: int) -> float:
+        """Return an argument that URScript requires to be above 0."""
+        number = self._number(index)
+        if number <= 0.0:
+            raise ScriptError(f"argument {index}: {number}; expected above 0")
+        return number
+
+    @property
+    def _half_rise(self) -> float:
+        return min(max(self._number(9), LOOK_AHEAD[0]), LOOK_AHEAD[1]) + DEAD_TIME
 
     def _servo_tool(self) -> None:
-        if not self.arm.servo(self._six(), self._number(9) + DEAD_TIME):
+        before, following = self.arm.target, isinstance(self.arm.motion, Servo)
+        pose = self.poses.take(self._six(), self.silence)
+        solved = self.arm.servo(pose, self._half_rise)
+        fast = self.poses.too_fast(before, self.arm.target, self.silence)
+        if not solved or (following and fast):
             # get_inverse_kin raises and ends the script; the client is not told.
             self.kill()
 
     def _servo_joints(self) -> None:
-        if np.isfinite(self._six()).all():
-            self.arm.servo_joints(self._six(), self._number(9) + DEAD_TIME)
-        else:
-            self.kill()
+        self.arm.servo_joints(self._six(), self._half_rise)
 
     def _speed_tool(self) -> None:
-        self.arm.motion = Speed(self._six(), self._number(6))
+        self.arm.motion = Speed(self._six(), self._positive(6))
 
     def _speed_joints(self) -> None:
-        self.arm.motion = JointSpeed(self._six(), self._number(6))
+        self.arm.motion = JointSpeed(self._six(), self._positive(6))
 
     def _force_mode(self) -> None:
-        force = Force(self._six(), self._number(8), self._number(14))
+        force = Force(self._six(), self._number(8), abs(self._number(14)))
         self.arm.press(force if self.inputs_int[self.offset + 4] else None)
 
     def _end_force_mode(self) -> None:
@@ -191,11 +220,11 @@ class ControlScript:
         if self.arm.solve(self._six()) is None:
             self.kill()
             return None
-        line = Line(self._six(), self._number(6), self._number(7))
+        line = Line(self._six(), self._positive(6), self._positive(7))
         return self._until_done(line)
 
     def _move_joints(self) -> Waiting:
-        line = JointLine(self._six(), self._number(6), self._number(7))
+        line = JointLine(self._six(), self._positive(6), self._positive(7))
         return self._until_done(line)
 
     def _move_joints_to_pose(self) -> Waiting | None:
@@ -203,7 +232,7 @@ class ControlScript:
         if angles is None:
             self.kill()
             return None
-        line = JointLine(angles, self._number(6), self._number(7))
+        line = JointLine(angles, self._positive(6), self._positive(7))
         return self._until_done(line)
 
     def _halt(self) -> Waiting:
@@ -256,6 +285,17 @@ class ControlScript:
 
     def _check_steady(self) -> None:
         self._reply(int(self.arm.at_rest), 1)
+
+
+def _checked(arguments: Array) -> Array:
+    """Return the arguments of a command.
+
+    Raises:
+        ScriptError: One is not finite, or is too large to make sense.
+    """
+    if not (np.abs(arguments) <= LARGEST).all():
+        raise ScriptError(f"arguments {arguments}; expected finite numbers")
+    return arguments
 
 
 def _nothing() -> None:
