@@ -56,6 +56,8 @@ class TableLoop:
         self._camera = TableCamera(setup.geometry, self._view, base, seed=seed)
         self._every = max(round(RATE / frame_rate), 1)
         self._steps, self._frames, self._frozen = 0, 0, False
+        self._repeats = self._stuck = False
+        self._image = np.zeros((0, 0, 3), np.uint8)
         self._moving: threading.Thread | None = None
         self._now = time.monotonic()
         self._paddle_state = block.read()[1:].tolist()
@@ -65,11 +67,19 @@ class TableLoop:
             "moved_camera": self._move_camera,
             "delayed_frames": self._delay,
             "second_puck": self._add_puck,
+            "repeated_frames": self._repeat,
+            "stuck_frame": self._stick,
             "lost_puck": self._remove_puck,
         }
 
     def _freeze(self, on: bool) -> None:
         self._frozen = on
+
+    def _repeat(self, on: bool) -> None:
+        self._repeats = on
+
+    def _stick(self, on: bool) -> None:
+        self._stuck = on
 
     def _darken(self, on: bool) -> None:
         self._camera.dark = on
@@ -114,8 +124,10 @@ class TableLoop:
         puck = world.puck if world.present else None
         seen = Seen(puck, moving, paddle, velocity)
         self._frames += 1
-        image = self._camera.photograph(seen, self._frames)
-        return Frame(image, now, self._frames)
+        again = self._stuck or (self._repeats and self._frames % 2)
+        if not (again and self._image.size):
+            self._image = self._camera.photograph(seen, self._frames)
+        return Frame(self._image, now, self._frames)
 
     def obey(self, order: dict[str, Any]) -> dict[str, Any]:
         """Carry out an order of the lab's operator; return the true state."""

@@ -1,3 +1,4 @@
+import time
 from contextlib import closing
 
 import pytest
@@ -36,3 +37,5 @@ def fault(lab):
     yield switch
     for name in on:
         lab.ask({"do": "fault", "name": name, "on": False})
+    # Frames are on their way for a moment.
+    time.sleep(0.1 if on else 0.0)

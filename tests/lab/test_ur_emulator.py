@@ -210,7 +210,7 @@ def test_a_client_in_plain_python_streams_and_writes():
         setup = exchange(ord("O"), struct.pack(">d", 125.0) + names)
         assert setup == b"\x01DOUBLE,VECTOR6D,INT32"
         unknown = exchange(ord("I"), b"input_int_register_0,no_such_name")
-        assert unknown == b"\x01INT32,NOT_FOUND"
+        assert unknown == b"\x00INT32,NOT_FOUND"
         assert exchange(ord("S"), b"") == b"\x01"
         stamps = []
         while len(stamps) < 20:

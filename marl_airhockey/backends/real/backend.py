@@ -35,6 +35,8 @@ FIRST_FRAME = 10.0
 """Longest time from opening a camera to its first frame, s"""
 BLIND = 0.3
 """Time without a camera frame after which an episode ends, s"""
+DELAYED = 0.15
+"""Time from an exposure until its frame arrives after which an episode ends, s"""
 LOST = 2.0
 """Time for which a puck may be unseen, s"""
 FIRST = 3
@@ -246,11 +248,12 @@ class RealBackend(Backend):
                 if far < APART:
                     return
             time.sleep(0.02)
+        trouble = self._camera.trouble or self.watcher.trouble
         where = "not seen" if not np.isfinite(far) else f"seen {far:.2f} m from there"
         raise RuntimeError(
             f"the puck is {where} within {PLACING:.0f} s (target "
             f"{np.round(target, 2)} m); "
-            f"{self._camera.trouble or 'put it at its target'}"
+            f"{trouble or 'put it at its target'}"
         )
 
     def _first_sightings(self) -> list[Sighting]:
@@ -303,12 +306,20 @@ class RealBackend(Backend):
             return f"robot: {robot.fault.label}"
         if not robot.is_connected:
             return "robot: its driver has ended"
-        if self.scene.pucks and self._camera.age > BLIND:
-            return self._camera.trouble
-        last = self._tracker.last
+        return self._blindness(now) if self.scene.pucks else ""
+
+    def _blindness(self, now: float) -> str:
+        """Return why the puck's state is not known; "" if it is."""
+        camera, last = self._camera, self._tracker.last
+        if camera.age > BLIND:
+            return camera.trouble
+        if camera.transit > DELAYED:
+            return f"camera: frames arrive {camera.transit:.2f} s after their exposure"
+        if self.watcher.trouble:
+            return self.watcher.trouble
         if last is not None and now - last.time > LOST:
             return f"puck: not seen for {LOST:.0f} s"
-        return ""
+        return self._tracker.innovations.trouble
 
     def _fill(self, state: State, now: float, since: float) -> None:
         """Fill a state with positions and velocities now and new contacts.

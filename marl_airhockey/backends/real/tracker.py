@@ -7,6 +7,7 @@ import time
 import numpy as np
 
 from marl_airhockey.backends.real.events import Track, find_contacts
+from marl_airhockey.backends.real.innovations import Innovations
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import State
@@ -38,6 +39,8 @@ class Tracker:
         """Newest sighting, filtered; None before an episode begins."""
         self.noise = 0.0
         """Mean distance of the sightings from the filtered positions, m."""
+        self.innovations = Innovations()
+        """Distances of the sightings from their predictions."""
         if scene.pucks:
             # Compiles filter and contacts before an episode begins.
             first, later = (
@@ -50,6 +53,7 @@ class Tracker:
     def forget(self) -> None:
         """Forget the puck until the next episode begins."""
         self.last, self._touching, self.noise = None, False, 0.0
+        self.innovations.restart()
 
     def begin(self, seen: list[Sighting]) -> None:
         """Begin an episode with the first sightings of the puck, oldest first."""
@@ -107,6 +111,9 @@ class Tracker:
         last, taken = self.last, sighting.taken
         if last is not None and taken <= last.time:
             return
+        if last is not None:
+            self._update(np.zeros(2), 0.0, False, track, taken)
+            self.innovations.add(sighting.place - self._estimator.now[0, 0, :2])
         # The filtered position at the time of the frame itself.
         self._update(sighting.place, taken, True, track, taken)
         found = self._estimator.now[0, 0]

@@ -10,6 +10,8 @@ from typing import NamedTuple, Protocol, Self
 
 from marl_airhockey.types import Array
 
+TRANSIT_WEIGHT = 0.1
+"""Weight of the newest frame in the mean time of transit"""
 STALE = 0.1
 """Age of the newest frame beyond which frames are missing, s"""
 
@@ -64,6 +66,8 @@ class Camera:
         self._closing = False
         self._thread: threading.Thread | None = None
         self._error = ""
+        self.transit = 0.0
+        """Mean time from a frame's exposure until it arrived, s."""
         self.dropped = 0
         """Number of frames that `next` did not return before a newer one came."""
         self._taken = -1
@@ -100,6 +104,9 @@ class Camera:
                 if frame is None:
                     break
                 frame = frame._replace(arrived=time.monotonic())
+                transit = frame.arrived - frame.taken
+                weight = TRANSIT_WEIGHT if self._frame is not None else 1.0
+                self.transit += weight * (transit - self.transit)
                 for listen in tuple(self.listeners):
                     listen(frame)
                 with self._new:

@@ -6,9 +6,16 @@ import threading
 import time
 from collections import deque
 
+import numpy as np
+
 from marl_airhockey.devices.camera import Camera
 from marl_airhockey.devices.vision.detector import Detector, Sighting
+from marl_airhockey.types import Array
 
+STUCK = 0.3
+"""Time without a new picture after which a camera is stuck, s"""
+RECENT, REPEATS = 20, 5
+"""Number of recent frames, and of repeats among them that are too many"""
 KEPT = 256
 """Largest number of sightings that are kept until `Watcher.take`"""
 
@@ -34,7 +41,34 @@ class Watcher:
         """CPU time of the detector so far, s."""
         self.pictures = 0
         """Number of frames that were searched."""
+        self._image = np.zeros((0, 0, 3), np.uint8)
+        self._changed_at = time.monotonic()
+        self._repeats: deque[bool] = deque(maxlen=RECENT)
         self._thread.start()
+
+    @property
+    def trouble(self) -> str:
+        """Reason why the camera's pictures are no news; "" if they are."""
+        if not self._repeats or not any(self._repeats):
+            return ""
+        same = time.monotonic() - self._changed_at
+        if all([*self._repeats][-REPEATS:]):
+            return f"camera: the same picture for {same:.1f} s" if same > STUCK else ""
+        if sum(self._repeats) >= REPEATS:
+            return (
+                f"camera: {sum(self._repeats)} of {len(self._repeats)} pictures repeat "
+                "the one before"
+            )
+        return ""
+
+    def _is_repeated(self, image: Array) -> bool:
+        """Return True if an image is the one before: noise changes every real one."""
+        same = np.array_equal(image, self._image)
+        self._image = image
+        self._repeats.append(same)
+        if not same:
+            self._changed_at = time.monotonic()
+        return same
 
     def _watch(self) -> None:
         number = -1
@@ -43,7 +77,9 @@ class Watcher:
             if frame is None:
                 continue
             number, began = frame.number, time.thread_time()
-            seen = self._detector.find(frame)
+            # A puck that did not move since would seem to have stopped.
+            repeated = self._is_repeated(frame.image)
+            seen = None if repeated else self._detector.find(frame)
             self.seconds += time.thread_time() - began
             self.pictures += 1
             self.looked_at = frame.taken

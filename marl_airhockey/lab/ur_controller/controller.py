@@ -62,7 +62,7 @@ class Controller:
         self.delay = 0.0
         """Time by which data is sent late, a fault, s"""
         self.stall = 0.0
-        """Time for which the controller does nothing twice a second, a fault, s"""
+        """Time for which programs and data stand still twice a second, a fault, s"""
         self._stall_from = 0
         self.refuses = False
         """True if connections are closed and refused, a fault"""
@@ -134,14 +134,14 @@ class Controller:
         return True
 
     def set_stall(self, seconds: float) -> None:
-        """Do nothing for some seconds, now and then twice a second; 0 ends it."""
+        """Stall for some seconds, now and then twice a second; 0 ends it."""
         self.stall, self._stall_from = seconds, self.ticks
 
     @property
-    def stall_is_due(self) -> bool:
-        """True in the periods after which the controller does nothing for a while."""
-        passed = self.ticks - self._stall_from
-        return bool(self.stall) and passed % STALL_EVERY == 1
+    def stalled(self) -> bool:
+        """True while programs and data stand still; the joints go to their target."""
+        passed = (self.ticks - self._stall_from) % STALL_EVERY
+        return passed * DT < self.stall
 
     def take(self, values: dict[str, Any]) -> None:
         """Keep what a client has written, by name, for the next period."""
@@ -158,11 +158,12 @@ class Controller:
         # controller is never late; what piled up while this one was is taken as it
         # came, or the arm would be sent on a leap.
         count = len(self._pending) if not behind else int(self.ticks % SPACING == 0)
-        for values in self._pending[:count]:
-            self._write(values)
-        del self._pending[:count]
-        self._start_script()
-        self.script.step()
+        if not self.stalled:
+            for values in self._pending[:count]:
+                self._write(values)
+            del self._pending[:count]
+            self._start_script()
+            self.script.step()
         safe = self.arm.safety
         self.arm.step()
         if self.arm.safety is not Safety.NORMAL and safe is Safety.NORMAL:

@@ -147,7 +147,7 @@ FAULTS = {
     "silent_robot": Fault("the controller sends no more data", _silent),
     "delayed_packets": Fault("data of the controller come 0.1 s late", _delayed),
     "dropped_connection": Fault("RTDE connections are closed, and refused", _dropped),
-    "loss_of_real_time": Fault("the controller stalls for 80 ms twice a s", _stalled),
+    "loss_of_real_time": Fault("programs and data stall for 80 ms twice a s", _stalled),
     "puck_under_paddle": Fault("the paddle is lifted by 6 mm", _raised),
     "speed_slider": Fault("somebody turns the speed slider to 10 %", _slowed),
     "local_control": Fault("the pendant is switched to local control", _local),

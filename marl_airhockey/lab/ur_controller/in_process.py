@@ -63,7 +63,6 @@ class InProcessArm:
         self.controller, self._servo = controller, servo or ServoSettings()
         self.now = 0.0
         """Emulated time, s"""
-        self._stall_left = 0.0
         self._samples: deque[Sample] = deque()
         self._values = controller.values()
         self.connect()
@@ -87,23 +86,14 @@ class InProcessArm:
     def _set_watchdog(self) -> None:
         self._command(35, WATCHDOG)
 
-    @property
-    def stalled(self) -> bool:
-        """True while the controller does nothing."""
-        return self._stall_left > 0.0
-
     def advance(self, seconds: float) -> None:
         """Let emulated time pass."""
         controller = self.controller
         for _ in range(round(seconds / DT)):
             self.now += DT
-            if self.stalled:
-                self._stall_left -= DT
-                continue
             controller.step()
-            if controller.stall_is_due:
-                self._stall_left = controller.stall
-            if not (controller.silent or controller.refuses):
+            mute = controller.silent or controller.refuses or controller.stalled
+            if not mute:
                 values = controller.values()
                 self._samples.append(Sample(self.now + controller.delay, values))
         while self._samples and self._samples[0].time <= self.now:

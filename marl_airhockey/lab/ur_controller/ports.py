@@ -100,11 +100,9 @@ class Ports:
             if controller.refuses:
                 for client in tuple(self._clients):
                     client.close()
-            if self._clients and not controller.silent:
+            if self._clients and not (controller.silent or controller.stalled):
                 values = controller.values()
                 loop.call_later(controller.delay, self._send, controller.ticks, values)
-            if controller.stall_is_due:
-                await asyncio.sleep(controller.stall)
             due += DT
             wait = due - loop.time()
             await asyncio.sleep(max(wait, 0.0))

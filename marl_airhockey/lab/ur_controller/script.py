@@ -80,7 +80,7 @@ class ControlScript:
             10: self._speed_tool,
             11: self._servo_joints,
             24: self._servo_tool,
-            27: self._report_joints,
+            27: lambda: self._report(self.arm.angles),
         }
         self._regular: dict[int, Callable[[], Waiting | None]] = {
             1: self._move_joints,
@@ -98,7 +98,7 @@ class ControlScript:
             34: self._halt,
             35: self._set_watchdog,
             36: self._check_pose,
-            40: self._report_tool,
+            40: lambda: self._report(self.arm.tool),
             43: self._report_pose,
             44: self._report_pose_of,
             46: self._solve,
@@ -254,12 +254,6 @@ class ControlScript:
 
     def _report(self, six: Array) -> None:
         self.outputs_double[self.offset : self.offset + 6] = six
-
-    def _report_joints(self) -> None:
-        self._report(self.arm.angles)
-
-    def _report_tool(self) -> None:
-        self._report(self.arm.tool)
 
     def _report_pose(self) -> None:
         self._report(pose_vector(self.arm.pose))
