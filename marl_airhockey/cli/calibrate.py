@@ -153,6 +153,7 @@ def _devices(
     if not lab:
         yield camera, robot, "person", None
         return
+    require("rtde_receive", "hardware")
     from marl_airhockey.lab.calibration.lab_rig import running_lab
 
     with (

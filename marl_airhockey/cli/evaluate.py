@@ -120,6 +120,9 @@ def evaluate_driver(
         console.print_json(json.dumps(main_result))
         return
     console.print(result_table(results))
+    for result in results:
+        for reason, count in result.interruptions.items():
+            console.print(f"{result.driver}: {count} interrupted by {reason}")
     if runs is not None:
         console.print(runs.text)
 

@@ -46,6 +46,17 @@ def table_of(episode: Array, step: Array, columns: Columns) -> pa.Table:
     return pa.table(arrays)
 
 
+def warm_up() -> None:
+    """Make the first calls of pyarrow, which are slow."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    number = np.zeros(1, np.int32)
+    table = table_of(number, number, {"value": np.zeros((1, 2))})
+    pq.write_table(table, pa.BufferOutputStream(), **SETTINGS)
+    pa.Table.from_pylist([{"episode": 0, "reason": "", "returns": [0.0]}])
+
+
 def columns_of(table: pa.Table, layout: Mapping[str, Column]) -> Columns:
     """Return columns (n, ...) of a table of n steps.
 

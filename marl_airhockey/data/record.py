@@ -82,7 +82,10 @@ def record_episodes(
                 for first in range(begun, episodes, at_once):
                     world.reset(seed + first)
                     done = min(at_once, episodes - first)
-                    _record(world, writer, done, film=reel)
+                    if live:
+                        _record_live(world, writer, reel)
+                    else:
+                        _record(world, writer, done)
                     progress(first + done)
             finally:
                 if reel is not None:
@@ -179,12 +182,34 @@ def _player(driver: Any) -> dict[str, Any]:
     return {"driver": name, "person": None}
 
 
+def _record_live(world: World, writer: RecordingWriter, film: Film | None) -> None:
+    """Play an episode at a real table; what was played is on the disk in a second.
+
+    Args:
+        world: World whose episode has begun.
+        writer: Writer of the recording.
+        film: Film of its camera; None for none.
+    """
+
+    def only(columns: Columns) -> Columns:
+        shown = columns | (film_columns(film) if film else {})
+        return {name: value[0] for name, value in shown.items()}
+
+    writer.begin(only(first_columns(world)), *episode_notes(world))
+    no_actions, reason, done = np.zeros((1, 0, 2)), PLAYED, False
+    while not done:
+        result = world.step(no_actions)
+        writer.add(only(step_columns(world)))
+        reason = result.interruption or reason
+        done = bool(result.terminated[0] or result.truncated[0])
+    writer.end(reason)
+
+
 def _record(
     world: World,
     writer: RecordingWriter,
     count: int,
     most: int | None = None,
-    film: Film | None = None,
 ) -> int:
     """Play an episode in each world, and write the first ``count`` of them.
 
@@ -193,27 +218,23 @@ def _record(
         writer: Writer of the recording.
         count: Number of episodes that are written at most.
         most: Number of steps after which no further episode is written.
-        film: Film of the only world's camera.
 
     Returns:
         Number of steps that were written.
     """
-    first = first_columns(world) | (film_columns(film) if film else {})
+    first = first_columns(world)
     notes = [episode_notes(world, i) for i in range(count)]
     rows: list[Columns] = []
     length = np.zeros(world.num_worlds, np.int64)
     done, no_actions = length > 0, np.zeros((world.num_worlds, 0, 2))
-    reasons = [PLAYED] * count
     while not done[:count].all():
         result = world.step(no_actions)
         length[~done] += 1
         done |= result.terminated | result.truncated
-        rows.append(step_columns(world) | (film_columns(film) if film else {}))
-        if result.interruption:
-            reasons[0] = result.interruption
+        rows.append(step_columns(world))
     if most is not None:
         count = min(count, 1 + int(np.searchsorted(np.cumsum(length), most)))
-    write_episodes(writer, first, rows, length, notes[:count], reasons[:count])
+    write_episodes(writer, first, rows, length, notes[:count], [PLAYED] * count)
     return int(length[:count].sum())
 
 

@@ -8,9 +8,10 @@ import os
 import shutil
 import time
 from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from marl_airhockey.core.recording import (
     Columns,
 )
 from marl_airhockey.data.files import parent_of
-from marl_airhockey.data.parquet import EXTRA, table_of, write_table
+from marl_airhockey.data.parquet import EXTRA, table_of, warm_up, write_table
 from marl_airhockey.data.parts import merge_parts, part_path, parts_of
 
 FLUSH = 0.5
@@ -60,8 +61,21 @@ def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWr
             raise
 
 
+class Block(NamedTuple):
+    """Steps that wait to be written."""
+
+    episode: int
+    first: int
+    """Number of the first of them"""
+    size: int
+    """Number of steps"""
+    rows: Columns
+
+
 class RecordingWriter:
     """Writer of a recording.
+
+    A thread of its own writes to the disk, so that `add` and `end` return at once.
 
     Args:
         path: Folder, which must not exist.
@@ -80,6 +94,7 @@ class RecordingWriter:
         try:
             self._write_meta()
         except OSError:
+            self._disk.shutdown()
             self._lock.close()
             shutil.rmtree(path, ignore_errors=True)
             raise
@@ -119,8 +134,12 @@ class RecordingWriter:
             for name, fields in head.get("columns", {}).items()
         }
         self._first: Columns | None = None
-        self._waiting: list[tuple[int, int, Columns]] = []
+        self._waiting: list[Block] = []
         self._count, self._step = 0, 0
+        # The first calls of pyarrow take half a second.
+        warm_up()
+        self._disk = ThreadPoolExecutor(1, "recorder")
+        self._writing: tuple[Future[None], int] | None = None
         self._flushed, self._changed = time.monotonic(), False
 
     def __enter__(self) -> RecordingWriter:
@@ -188,28 +207,63 @@ class RecordingWriter:
         self._flush_in_time()
 
     def _flush_in_time(self) -> None:
-        if time.monotonic() - self._flushed > FLUSH:
-            self.flush()
+        """Have a thread write what waits; whoever adds steps must not wait for it."""
+        written = self._collect(wait=False)
+        if written and time.monotonic() - self._flushed > FLUSH:
+            self._flushed = time.monotonic()
+            episodes = [dict(row) for row in self._episodes] if self._changed else []
+            self._changed, blocks = False, self._waiting[:]
+            work = self._disk.submit(self._write, episodes, blocks, self._part)
+            self._writing = work, len(blocks)
+
+    def _collect(self, wait: bool) -> bool:
+        """Return whether the thread has written what it was given.
+
+        Args:
+            wait: Whether to wait for it.
+
+        Raises:
+            OSError: It could not; what it was given still waits.
+        """
+        if self._writing is None:
+            return True
+        work, count = self._writing
+        if not (wait or work.done()):
+            return False
+        self._writing = None
+        try:
+            work.result()
+        except OSError:
+            self._changed = True
+            raise
+        self._part += bool(count)
+        self._count -= sum(block.size for block in self._waiting[:count])
+        del self._waiting[:count]
+        return True
 
     def flush(self) -> None:
         """Write the steps that wait, to the disk."""
-        self._flushed = time.monotonic()
-        if self._changed:
-            write_table(self._episode_table(), self.path / EPISODES)
-            self._changed = False
-        if not self._waiting:
+        self._collect(wait=True)
+        self._flushed = 0.0
+        self._flush_in_time()
+        self._collect(wait=True)
+
+    def _write(
+        self, episodes: list[dict[str, Any]], blocks: list[Block], part: int
+    ) -> None:
+        """Write files: the rows of the episodes, if there are any, and a part."""
+        if episodes:
+            write_table(_episode_table(episodes), self.path / EPISODES)
+        if not blocks:
             return
-        episodes, steps, blocks = zip(*self._waiting, strict=True)
-        sizes = [len(next(iter(block.values()))) for block in blocks]
-        starts = zip(steps, sizes, strict=True)
+        sizes = [block.size for block in blocks]
+        steps = [np.arange(b.first, b.first + b.size, dtype=np.int32) for b in blocks]
         table = table_of(
-            np.repeat(np.array(episodes, np.int32), sizes),
-            np.concatenate([np.arange(s, s + n, dtype=np.int32) for s, n in starts]),
-            {n: np.concatenate([block[n] for block in blocks]) for n in self._layout},
+            np.repeat(np.array([b.episode for b in blocks], np.int32), sizes),
+            np.concatenate(steps),
+            {n: np.concatenate([b.rows[n] for b in blocks]) for n in self._layout},
         )
-        write_table(table, part_path(self.path, self._part))
-        self._part += 1
-        self._waiting, self._count = [], 0
+        write_table(table, part_path(self.path, part))
 
     def close(self) -> None:
         """Write what waits, merge small parts, and close."""
@@ -222,6 +276,7 @@ class RecordingWriter:
             if self._part > 1 + 2 * steps / PART:
                 merge_parts(self.path)
         finally:
+            self._disk.shutdown()
             (self.path / ".lock").unlink(missing_ok=True)
             self._lock.close()
 
@@ -257,7 +312,8 @@ class RecordingWriter:
                     f"{name}: shape {value.shape[1:]} in a step, before {column.shape}"
                 )
             rows[name] = value.astype(column.dtype)
-        self._waiting.append((len(self._episodes) - 1, self._step, rows))
+        block = Block(len(self._episodes) - 1, self._step, count, rows)
+        self._waiting.append(block)
         self._step += count
         self._count += count
 
@@ -270,12 +326,13 @@ class RecordingWriter:
             os.fsync(file.fileno())
         draft.replace(self.path / META)
 
-    def _episode_table(self) -> Any:
-        import pyarrow as pa
 
-        kinds = {"episode": pa.int32(), "seed": pa.uint64(), "number": pa.int64()}
-        kinds |= {"length": pa.int64(), "reason": pa.string()}
-        kinds |= dict.fromkeys(("returns", "success"), pa.list_(pa.float64()))
-        names = list(dict.fromkeys(name for row in self._episodes for name in row))
-        fields = [(name, kinds.get(name, pa.float64())) for name in names]
-        return pa.Table.from_pylist(self._episodes, pa.schema(fields))
+def _episode_table(episodes: list[dict[str, Any]]) -> Any:
+    import pyarrow as pa
+
+    kinds = {"episode": pa.int32(), "seed": pa.uint64(), "number": pa.int64()}
+    kinds |= {"length": pa.int64(), "reason": pa.string()}
+    kinds |= dict.fromkeys(("returns", "success"), pa.list_(pa.float64()))
+    names = list(dict.fromkeys(name for row in episodes for name in row))
+    fields = [(name, kinds.get(name, pa.float64())) for name in names]
+    return pa.Table.from_pylist(episodes, pa.schema(fields))

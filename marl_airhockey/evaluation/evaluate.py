@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -55,6 +56,8 @@ class EvaluationResult:
     deployability: Deployability
     interrupted: int = 0
     """Number of episodes that a real table had to end; they are no success"""
+    interruptions: dict[str, int] = field(default_factory=dict)
+    """Reasons of these, and how many episodes each of them ended"""
     observe: str = ""
     """Form of the driver's observations"""
     control_dt: float = 0.05
@@ -142,6 +145,7 @@ def evaluate(
         hits=float(statistics.hits.mean()),
         deployability=deployability,
         interrupted=len(statistics.interruptions),
+        interruptions=dict(Counter(statistics.interruptions).most_common()),
         observe=driver.observe or world.observer.observe,
         control_dt=world.control_dt,
         options=dict(keywords.get("options", {})),

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.lab.arm_process import run_arm
 from marl_airhockey.lab.door import DoorClient, open_door, port_in
@@ -41,11 +42,16 @@ class Lab:
         setup: Setup of the lab; None for the default.
         seed: Seed of the table's physical parameters.
         frame_rate: Frame rate of the cameras, 1/s.
+
+    Raises:
+        RuntimeError: The extra is not installed, or a process does not start.
     """
 
     def __init__(
         self, setup: LabSetup | None = None, seed: int = 0, frame_rate: float = 30.0
     ) -> None:
+        # Before a process starts: its error would be a traceback of its own.
+        require("scipy", "hardware")
         self.setup = setup or LabSetup()
         context = multiprocessing.get_context("spawn")
         # Referenced here, as memory without a reference is freed and used again.

@@ -16,10 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.core.recording import FILM, Columns
 from marl_airhockey.data.columns import episode_notes, head_of, step_columns
 from marl_airhockey.data.files import new_recording
 from marl_airhockey.data.film import film_columns
+from marl_airhockey.data.parquet import EXTRA, warm_up
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
@@ -45,6 +47,9 @@ class Recorder:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ValueError(f"--record {folder}: {error.strerror}") from error
+        # Here, and not in the first step of a match.
+        require("pyarrow", EXTRA)
+        warm_up()
         self._folder, self._camera = folder, camera
         self._film: Film | None = None
         self._keep, self._kept = keep, deque[Path]()

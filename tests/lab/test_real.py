@@ -2,16 +2,21 @@
 
 import copy
 import dataclasses
+import importlib.util
+import threading
 import time
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import marl_airhockey as ah
+from marl_airhockey.cli.main import app
 from marl_airhockey.core.errors import UnknownKeywordError
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.lab.lab import LabClient
 from marl_airhockey.registry import find_backend, make_agent
 from marl_airhockey.world.build import build_driven_world
 
@@ -52,6 +57,49 @@ def test_a_puck_is_seen_touched_and_lost_as_it_is(lab, rig):
             copy.deepcopy(world)
     finally:
         world.close()
+
+
+@pytest.mark.slow
+def test_an_evaluation_names_the_reasons_of_interruptions(rig, fault):
+    timer = threading.Timer(4.0, fault, ["frozen_camera"])
+    timer.start()
+    result = evaluate("zoo/juggle_full_size", "juggle", episodes=1, **keywords(rig))
+    timer.join()
+    assert result.interrupted == 1
+    (reason, count), *_ = result.interruptions.items()
+    assert count == 1
+    assert "no frame" in reason
+    assert result.to_json()["interruptions"] == {reason: 1}
+
+
+@pytest.mark.parametrize(
+    ("command", "missing"),
+    [
+        ("evaluate zoo/reach --backend real --lab --episodes 1", "rtde_control"),
+        ("teleop reach --lab --no-browser", "rtde_control"),
+        ("calibrate arm --lab", "rtde_control"),
+        ("calibrate delay --lab", "rtde_control"),
+        ("lab", "scipy"),
+    ],
+)
+def test_a_command_names_a_missing_extra_before_the_lab_starts(
+    monkeypatch, command, missing
+):
+    found = importlib.util.find_spec
+
+    def find(name, *rest):
+        return None if name == missing else found(name, *rest)
+
+    def start(*_):
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(importlib.util, "find_spec", find)
+    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", start)
+    monkeypatch.setattr(LabClient, "find", staticmethod(lambda: None))
+    result = CliRunner().invoke(app, command.split())
+    assert result.exit_code != 0
+    said = result.output + str(result.exception)
+    assert f"{missing} is not installed: pip install 'marl_airhockey[hardware]'" in said
 
 
 def test_a_reach_beyond_the_joints_is_refused_before_anything_moves(rig, tmp_path):

@@ -51,7 +51,10 @@ def test_a_match_goes_on_unrecorded(table, tmp_path):
     recorder = table.host.recorder
     with largest_file(200):
         recorder._writer._flushed = 0.0
-        run_a_match(table, client, RATE)
+        run_a_match(table, client, 1)
+        # A thread writes; the first step after it has failed says so.
+        recorder._writer._disk.submit(int).result()
+        run_a_match(table, client, 1)
     assert table.match.phase == "play"
     state = json.loads(client.frame)
     assert not state["recording"]

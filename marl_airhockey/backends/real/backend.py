@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -22,6 +23,7 @@ from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.camera import Camera, open_source
 from marl_airhockey.devices.rig import Rig
 from marl_airhockey.devices.robot import DriverState, Fault, Robot, RobotError
+from marl_airhockey.devices.robot.supervisor import LATCHED
 from marl_airhockey.devices.vision import Detector, Sighting
 from marl_airhockey.devices.vision.calibration import view_trouble
 from marl_airhockey.devices.vision.rectifier import Rectifier
@@ -29,6 +31,7 @@ from marl_airhockey.devices.vision.watcher import Watcher
 from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
+log = logging.getLogger("marl_airhockey.real")
 PROFILE = "ur5e"
 """Profile of the table's robot"""
 FIRST_FRAME = 10.0
@@ -37,6 +40,8 @@ BLIND = 0.3
 """Time without a camera frame after which an episode ends, s"""
 DELAYED = 0.15
 """Time from an exposure until its frame arrives after which an episode ends, s"""
+LATE = 0.02
+"""Delay of a command after the end of its last step that is logged, s"""
 LOST = 2.0
 """Time for which a puck may be unseen, s"""
 FIRST = 3
@@ -279,6 +284,7 @@ class RealBackend(Backend):
     def _move(self, command: Command, before: State, after: State) -> None:
         """Send the command, wait for the end of the step and fill ``after``."""
         self._commanded = command.velocity[0, 0].copy()
+        self._report_lateness(time.monotonic())
         self.robot.send_action(self._commanded, self.control_dt)
         self._due += self.control_dt
         left = self._due - time.monotonic()
@@ -299,10 +305,27 @@ class RealBackend(Backend):
         if self._reason:
             self.robot.disable()
 
+    def _report_lateness(self, began: float) -> None:
+        """Log a step whose command comes late, and what took the time.
+
+        Args:
+            began: Time at which the step began, s.
+        """
+        late = began - self._due
+        if late > LATE:
+            log.warning(
+                "real table: a command is %.0f ms late: policy, observation and "
+                "recording took %.0f ms since the last step",
+                1e3 * late,
+                1e3 * (began - self._moment),
+            )
+
     def _trouble(self, now: float) -> str:
         """Return why the episode cannot continue; "" if it can."""
         robot = self.robot
-        if robot.state in (DriverState.FAULT, DriverState.HOLD):
+        # A HOLD because commands were late ends with the next command.
+        held = robot.state is DriverState.HOLD and robot.fault in LATCHED
+        if held or robot.state is DriverState.FAULT:
             return f"robot: {robot.fault.label}"
         if not robot.is_connected:
             return "robot: its driver has ended"

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.camera import Camera, Frame, open_source
 from marl_airhockey.devices.hand_rig import HandRig
@@ -160,8 +161,9 @@ def lab_rig() -> Iterator[Path]:
     """Yield the rig's file of the `running_lab`.
 
     Raises:
-        RuntimeError: The lab does not start.
+        RuntimeError: The client of the arm is not installed, or the lab does not start.
     """
+    require("rtde_control", "hardware")
     with running_lab() as client:
         path = cache_folder() / f"lab-{client.port}.json"
         calibrate_lab(client).save(path)

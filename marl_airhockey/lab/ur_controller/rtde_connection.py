@@ -150,7 +150,6 @@ class RtdeConnection:
         ]
         answer = ",".join(types).encode()
         if not recipe.known or TAKEN in types:
-            self._refused = True
             return b"\x00" + answer
         self._owners.update(dict.fromkeys(recipe.names, self))
         self._inputs.append(recipe)
