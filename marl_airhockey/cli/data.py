@@ -167,6 +167,7 @@ def check(
 ) -> None:
     """Read all of recordings and name what is wrong; exit 1 if anything is."""
     from marl_airhockey.data.files import recordings_in
+    from marl_airhockey.data.film import episodes_without_film
     from marl_airhockey.data.reader import episodes_of, missing_steps
     from marl_airhockey.data.verify import EXACT, replay_differences
 
@@ -175,6 +176,8 @@ def check(
     for path in recordings_in(paths):
         try:
             cut = missing_steps(path)
+            filmed = episodes_of(path, ("frame",), bad=[])
+            cut |= episodes_without_film(path, filmed)
             count += sum(e.index not in cut for e in episodes_of(path, bad=wrong))
             wrong += cut.values()
             found = replay_differences(path) if replay else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from marl_airhockey.core.recording import FILM
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.data.files import is_recording
+from marl_airhockey.data.film import episodes_without_film
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.devices.camera import FileSource, Frame
 from marl_airhockey.devices.camera.film import read_times
@@ -112,7 +114,6 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
         )
     taken, places, moving = (np.array(column) for column in zip(*rows, strict=True))
     if times is not None:
-        # What was cut off may lack its last times, or its last pictures.
         count = min(len(times), len(taken))
         taken, places, moving = times[:count], places[:count], moving[:count]
     shown = np.isfinite(taken)
@@ -133,6 +134,12 @@ def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
         raise ValueError(f"{path}: no step of it has a picture")
     taken = read_times(video)
     played = np.zeros(len(taken), np.bool_)
+    cut = episodes_without_film(path, recording.episodes)
+    for words in cut.values():
+        warnings.warn(f"{words}; left out", RuntimeWarning, stacklevel=3)
+    whole = [episode for episode in whole if episode.index not in cut]
+    if not whole:
+        raise ValueError(f"{path}: every episode lacks pictures")
     for episode in whole:
         moments = episode.columns["device.moment"]
         played |= (taken >= moments[0]) & (taken <= moments[-1])
@@ -152,7 +159,7 @@ def _pictures(path: Path) -> Iterator[Frame]:
     source.open()
     try:
         while (frame := source.read()) is not None:
-            yield Frame(frame.image, frame.number / source.rate, frame.number)
+            yield frame
     finally:
         source.close()
 

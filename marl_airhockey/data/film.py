@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
 import numpy as np
 
-from marl_airhockey.core.recording import Columns
+from marl_airhockey.core.recording import FILM, Columns, RecordedEpisode
 from marl_airhockey.devices.camera import Film
 from marl_airhockey.types import Array
 
@@ -20,6 +21,39 @@ def film_columns(film: Film) -> Columns:
     """
     number, taken = film.last or (-1, np.nan)
     return {"frame": np.array([number], np.int64), "frame_taken": np.array([taken])}
+
+
+def episodes_without_film(
+    path: Path, episodes: Iterable[RecordedEpisode]
+) -> dict[int, str]:
+    """Return messages about episodes whose last pictures the film lacks, by episode.
+
+    Args:
+        path: Folder of the recording.
+        episodes: Its episodes.
+    """
+    film = path / FILM
+    if not film.exists():
+        return {}
+    count, found = count_frames(film), {}
+    for episode in episodes:
+        shown = episode.columns.get("frame", np.zeros(0))
+        last = int(shown.max(initial=-1))
+        if last >= count:
+            found[episode.index] = (
+                f"{path}: episode {episode.index}: the film ends {last + 1 - count} "
+                "pictures before it"
+            )
+    return found
+
+
+def count_frames(film: Path) -> int:
+    """Return the number of frames that are in a film."""
+    capture, count = cv2.VideoCapture(str(film)), 0
+    while capture.grab():
+        count += 1
+    capture.release()
+    return count
 
 
 class FilmFrames:
@@ -38,18 +72,16 @@ class FilmFrames:
         self._number, self._image = -1, np.zeros((0, 0, 3), np.uint8)
 
     def picture(self, number: int) -> Array:
-        """Return a frame (H, W, 3) uint8, BGR; of a film cut short, the last one.
+        """Return a frame (H, W, 3) uint8, BGR.
 
         Raises:
-            ValueError: There is no frame in the film.
+            ValueError: The film ends before it.
         """
         if number < self._number:
             self._open()
         while self._number < number:
             known, image = self._capture.read()
             if not known:
-                break
+                raise ValueError(f"{self.path}: it has no picture {number}")
             self._number, self._image = self._number + 1, np.asarray(image)
-        if not self._image.size:
-            raise ValueError(f"{self.path}: no frame of it can be read")
         return self._image

@@ -8,16 +8,14 @@ import os
 import shutil
 import time
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.recording import (
-    EPISODES,
     FORMAT,
     META,
     PHYSICS,
@@ -25,9 +23,10 @@ from marl_airhockey.core.recording import (
     Column,
     Columns,
 )
+from marl_airhockey.data.blocks import Block, DiskWriter
 from marl_airhockey.data.files import parent_of
-from marl_airhockey.data.parquet import EXTRA, table_of, warm_up, write_table
-from marl_airhockey.data.parts import merge_parts, part_path, parts_of
+from marl_airhockey.data.parquet import EXTRA, warm_up
+from marl_airhockey.data.parts import merge_parts, parts_of
 
 FLUSH = 0.5
 """Longest time for which steps wait until they are on the disk, s"""
@@ -61,17 +60,6 @@ def whole_recording(path: Path, head: Mapping[str, Any]) -> Iterator[RecordingWr
             raise
 
 
-class Block(NamedTuple):
-    """Steps that wait to be written."""
-
-    episode: int
-    first: int
-    """Number of the first of them"""
-    size: int
-    """Number of steps"""
-    rows: Columns
-
-
 class RecordingWriter:
     """Writer of a recording.
 
@@ -94,7 +82,7 @@ class RecordingWriter:
         try:
             self._write_meta()
         except OSError:
-            self._disk.shutdown()
+            self._disk.close()
             self._lock.close()
             shutil.rmtree(path, ignore_errors=True)
             raise
@@ -122,7 +110,7 @@ class RecordingWriter:
     def _start(
         self, path: Path, head: dict[str, Any], rows: list[dict[str, Any]], part: int
     ) -> None:
-        self.path, self._head, self._episodes, self._part = path, head, rows, part
+        self.path, self._head, self._episodes = path, head, rows
         self._lock = (path / ".lock").open("w")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -138,8 +126,7 @@ class RecordingWriter:
         self._count, self._step = 0, 0
         # The first calls of pyarrow take half a second.
         warm_up()
-        self._disk = ThreadPoolExecutor(1, "recorder")
-        self._writing: tuple[Future[None], int] | None = None
+        self._disk = DiskWriter(path, part)
         self._flushed, self._changed = time.monotonic(), False
 
     def __enter__(self) -> RecordingWriter:
@@ -213,8 +200,7 @@ class RecordingWriter:
             self._flushed = time.monotonic()
             episodes = [dict(row) for row in self._episodes] if self._changed else []
             self._changed, blocks = False, self._waiting[:]
-            work = self._disk.submit(self._write, episodes, blocks, self._part)
-            self._writing = work, len(blocks)
+            self._disk.start(episodes, blocks, self._layout)
 
     def _collect(self, wait: bool) -> bool:
         """Return whether the thread has written what it was given.
@@ -225,21 +211,14 @@ class RecordingWriter:
         Raises:
             OSError: It could not; what it was given still waits.
         """
-        if self._writing is None:
-            return True
-        work, count = self._writing
-        if not (wait or work.done()):
-            return False
-        self._writing = None
         try:
-            work.result()
+            count = self._disk.collect(wait)
         except OSError:
             self._changed = True
             raise
-        self._part += bool(count)
-        self._count -= sum(block.size for block in self._waiting[:count])
-        del self._waiting[:count]
-        return True
+        self._count -= sum(block.size for block in self._waiting[: count or 0])
+        del self._waiting[: count or 0]
+        return count is not None
 
     def flush(self) -> None:
         """Write the steps that wait, to the disk."""
@@ -247,23 +226,6 @@ class RecordingWriter:
         self._flushed = 0.0
         self._flush_in_time()
         self._collect(wait=True)
-
-    def _write(
-        self, episodes: list[dict[str, Any]], blocks: list[Block], part: int
-    ) -> None:
-        """Write files: the rows of the episodes, if there are any, and a part."""
-        if episodes:
-            write_table(_episode_table(episodes), self.path / EPISODES)
-        if not blocks:
-            return
-        sizes = [block.size for block in blocks]
-        steps = [np.arange(b.first, b.first + b.size, dtype=np.int32) for b in blocks]
-        table = table_of(
-            np.repeat(np.array([b.episode for b in blocks], np.int32), sizes),
-            np.concatenate(steps),
-            {n: np.concatenate([b.rows[n] for b in blocks]) for n in self._layout},
-        )
-        write_table(table, part_path(self.path, part))
 
     def close(self) -> None:
         """Write what waits, merge small parts, and close."""
@@ -273,10 +235,10 @@ class RecordingWriter:
             self._place_first()
             self.flush()
             steps = sum(row["length"] + 1 for row in self._episodes)
-            if self._part > 1 + 2 * steps / PART:
+            if self._disk.part > 1 + 2 * steps / PART:
                 merge_parts(self.path)
         finally:
-            self._disk.shutdown()
+            self._disk.close()
             (self.path / ".lock").unlink(missing_ok=True)
             self._lock.close()
 
@@ -325,14 +287,3 @@ class RecordingWriter:
         with draft.open() as file:
             os.fsync(file.fileno())
         draft.replace(self.path / META)
-
-
-def _episode_table(episodes: list[dict[str, Any]]) -> Any:
-    import pyarrow as pa
-
-    kinds = {"episode": pa.int32(), "seed": pa.uint64(), "number": pa.int64()}
-    kinds |= {"length": pa.int64(), "reason": pa.string()}
-    kinds |= dict.fromkeys(("returns", "success"), pa.list_(pa.float64()))
-    names = list(dict.fromkeys(name for row in episodes for name in row))
-    fields = [(name, kinds.get(name, pa.float64())) for name in names]
-    return pa.Table.from_pylist(episodes, pa.schema(fields))

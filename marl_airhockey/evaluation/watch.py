@@ -10,7 +10,7 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.render.renderer import TOP, Renderer
-from marl_airhockey.render.video import check_ending, write_video
+from marl_airhockey.render.video import check_ending, width_of, write_video
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_driven_world
 
@@ -25,7 +25,7 @@ def show_episodes(
     seed: int = 0,
     episodes: int = 1,
     video: Path | None = None,
-    width: int = 640,
+    width: int | None = None,
     seconds: float = float("inf"),
     viewpoint: str = TOP,
 ) -> list[Array]:
@@ -38,7 +38,7 @@ def show_episodes(
         seed: seed of the first episode.
         episodes: number of episodes.
         video: .gif, .webp or .mp4 to write; None opens a window.
-        width: width of the video, pixels.
+        width: Width of the video, px; None for that of its kind of file.
         seconds: time after which an episode is cut, s.
         viewpoint: "top", or one of the backend's viewpoints.
 
@@ -55,6 +55,7 @@ def show_episodes(
         raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
     if video is not None:
         check_ending(video)
+    width = width or width_of(video or "")
     world = build_driven_world(driver, scenario, 1, keywords)
     mode = "human" if video is None else "rgb_array"
     title = world.scenario.name.replace("_", " ")

@@ -10,27 +10,28 @@ from marl_airhockey.data.columns import memories_of, scenario_of, states_of
 from marl_airhockey.play.replay import one_episode
 from marl_airhockey.render.picture import Frame, draw
 from marl_airhockey.render.renderer import Renderer
-from marl_airhockey.render.video import write_video
+from marl_airhockey.render.video import width_of, write_video
 
 RATE = 30.0
 """Most pictures a second"""
 
 
 def write_recording_video(
-    recording: Path, video: Path, width: int = 640, number: int = 0
+    recording: Path, video: Path, width: int | None = None, number: int = 0
 ) -> None:
     """Write a video of a recorded episode, drawn as `airhockey watch` draws a game.
 
     Args:
         recording: its file.
         video: the file to write, .gif, .webp or .mp4.
-        width: of the pictures, pixels.
+        width: Width of the pictures, px; None for that of the kind of file.
         number: of the episode in the file.
 
     Raises:
         ValueError: no recording, no such episode, or a video with another
             ending.
     """
+    width = width or width_of(video)
     found, episode = one_episode(recording, number)
     scenario = scenario_of(found)
     states, memories = states_of(episode, scenario), memories_of(episode)

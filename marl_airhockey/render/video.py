@@ -1,16 +1,20 @@
-"""Video files: GIF and WebP by Pillow, MP4 by OpenCV."""
+"""Video files: GIF and WebP by Pillow, MP4 by PyAV."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 from PIL import Image
 
+from marl_airhockey.render.mp4 import Mp4Writer
 from marl_airhockey.types import Array
 
+WIDTHS = {".mp4": 1280}
+"""Width of a video by the ending of its file, px"""
+USUAL_WIDTH = 640
+"""Width of other videos, px"""
 QUALITY = 10
 """Quality of WebP, 0 .. 100"""
 
@@ -34,6 +38,11 @@ def write_video(path: Path | str, pictures: Sequence[Array], fps: float) -> Path
     check_ending(path)
     WRITERS[path.suffix](path, pictures, fps)
     return path
+
+
+def width_of(path: Path | str) -> int:
+    """Return the usual width of a video, px."""
+    return WIDTHS.get(Path(path).suffix, USUAL_WIDTH)
 
 
 def check_ending(path: Path) -> None:
@@ -74,14 +83,10 @@ def _write_webp(path: Path, pictures: Sequence[Array], fps: float) -> None:
 
 
 def _write_mp4(path: Path, pictures: Sequence[Array], fps: float) -> None:
-    size = (pictures[0].shape[1], pictures[0].shape[0])
-    code = cv2.VideoWriter.fourcc(*"mp4v")
-    writer = cv2.VideoWriter(str(path), code, fps, size)
-    if not writer.isOpened():
-        raise OSError(f"video: {path} could not be written")
+    writer = Mp4Writer(path, fps)
     for picture in pictures:
-        writer.write(cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-    writer.release()
+        writer.append(picture)
+    writer.close()
 
 
 WRITERS: dict[str, Callable[[Path, Sequence[Array], float], None]] = {

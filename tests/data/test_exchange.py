@@ -3,9 +3,12 @@
 import csv
 import json
 
+import cv2
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from marl_airhockey.cli.main import app
 from marl_airhockey.core.recording import FILM
 from marl_airhockey.data.exchange.formats import FORMATS, find_format, import_dataset
 from marl_airhockey.data.exchange.lerobot import export_lerobot
@@ -24,6 +27,7 @@ from marl_airhockey.registry import make_agent
 pd = pytest.importorskip("pandas")
 pq = pytest.importorskip("pyarrow.parquet")
 h5py = pytest.importorskip("h5py")
+av = pytest.importorskip("av")
 
 
 def recorded(folder, scenario="reach", driver="reacher", episodes=3, **keywords):
@@ -90,7 +94,6 @@ def test_lerobot_dataset_is_read_by_pyarrow_and_pandas_alone(tmp_path):
 
 
 def test_lerobot_video_shows_the_newest_picture_of_each_step(tmp_path):
-    cv2 = pytest.importorskip("cv2")
     path = recorded(tmp_path, episodes=2)
     code = cv2.VideoWriter.fourcc(*"MJPG")
     film = cv2.VideoWriter(str(path / FILM), code, 30, (64, 48))
@@ -113,15 +116,61 @@ def test_lerobot_video_shows_the_newest_picture_of_each_step(tmp_path):
     assert np.array(stats["mean"]).shape == (3, 1, 1)
 
 
-def _add_frames(path, numbers):
-    """Give the steps of each episode the numbers of pictures, the last one on."""
+def grey_film(path, count):
+    """Write the film of a recording, of so many pictures."""
+    code = cv2.VideoWriter.fourcc(*"MJPG")
+    film = cv2.VideoWriter(str(path / FILM), code, 30, (64, 48))
+    for _ in range(count):
+        film.write(np.full((48, 64, 3), 90, np.uint8))
+    film.release()
+
+
+def test_an_episode_whose_film_ends_before_it_is_named_and_left_out(tmp_path):
+    path = recorded(tmp_path, episodes=2)
+    _add_frames(path, [0, 1, 1, 3, 4], later=5)
+    grey_film(path, 8)
+    result = CliRunner().invoke(app, ["data", "check", str(path)])
+    assert result.exit_code == 1
+    assert "episode 1: the film ends 2 pictures before it" in result.output
+    assert "1 good episodes, 1 faults" in result.output
+    with pytest.warns(RuntimeWarning, match="episode 1: .* left out"):
+        folder = export_lerobot([path], "reach", tmp_path / "sets")
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert info["total_episodes"] == 1
+    grey_film(path, 3)
+    with (
+        pytest.warns(RuntimeWarning, match="left out"),
+        pytest.raises(ValueError, match="the film ends before every episode"),
+    ):
+        export_lerobot([path], "none", tmp_path / "sets")
+
+
+def test_an_exported_video_has_a_codec_that_browsers_play(tmp_path):
+    path = recorded(tmp_path, episodes=1)
+    _add_frames(path, [0, 1, 1, 3, 4])
+    grey_film(path, 5)
+    folder = export_lerobot([path], "reach", tmp_path / "sets")
+    info = json.loads((folder / "meta/info.json").read_text())
+    name = "observation.images.table"
+    assert info["features"][name]["info"]["video.codec"] == "h264"
+    (file,) = (folder / "videos").rglob("*.mp4")
+    with av.open(str(file)) as video:
+        assert video.streams.video[0].codec_context.name == "h264"
+
+
+def _add_frames(path, numbers, later=0):
+    """Give the steps of each episode the numbers of pictures, the last one on.
+
+    Those of each episode begin ``later`` after those of the one before.
+    """
     meta = json.loads((path / "meta.json").read_text())
     meta["columns"]["frame"] = {"dtype": "int64", "shape": []}
     (path / "meta.json").write_text(json.dumps(meta))
     for part in (path / "steps").iterdir():
         frame = pq.read_table(part).to_pandas()
         step = frame["step"].to_numpy()
-        frame["frame"] = np.array(numbers)[np.minimum(step, len(numbers) - 1)]
+        shown = np.array(numbers)[np.minimum(step, len(numbers) - 1)]
+        frame["frame"] = shown + later * frame["episode"].to_numpy()
         table = pq.read_table(part).append_column(
             "frame", [frame["frame"].astype("int64").tolist()]
         )

@@ -115,8 +115,16 @@ def test_a_camera_that_is_not_there_is_named():
 class Capture:
     """Capture device of OpenCV that gives 640 x 480 pictures, whatever is asked for."""
 
+    rate = 60.0
+    stamps = iter(())
+    """Time stamps of the driver, s"""
+
     def __init__(self, *_):
         self.asked = {}
+
+    def read(self):
+        self.stamp = next(self.stamps, 0.0)
+        return True, GREY
 
     def isOpened(self):
         return True
@@ -125,7 +133,12 @@ class Capture:
         self.asked[name] = value
 
     def get(self, name):
-        return {cv2.CAP_PROP_FRAME_WIDTH: 640, cv2.CAP_PROP_FRAME_HEIGHT: 480}[name]
+        return {
+            cv2.CAP_PROP_FRAME_WIDTH: 640,
+            cv2.CAP_PROP_FRAME_HEIGHT: 480,
+            cv2.CAP_PROP_FPS: self.rate,
+            cv2.CAP_PROP_POS_MSEC: 1e3 * getattr(self, "stamp", 0.0),
+        }[name]
 
     def release(self):
         pass
@@ -133,14 +146,19 @@ class Capture:
 
 @pytest.fixture
 def controls(monkeypatch, tmp_path):
-    """Values that controls were set to; the camera has no control of white balance."""
+    """Values that controls were set to; the camera has no control of white balance.
+
+    The control "stuck" keeps its value, whatever it is set to.
+    """
     found = {}
 
     def ioctl(descriptor, request, packed):
         control, value = v4l2.CONTROL.unpack(packed)
         if control == v4l2.CONTROLS["white_balance"][0]:
             raise OSError(22, "Invalid argument")
-        found[control] = value
+        if request == v4l2.SET_CONTROL and control != found.get("stuck"):
+            found[control] = value
+        return v4l2.CONTROL.pack(control, found.get(control, 3))
 
     monkeypatch.setattr(v4l2.fcntl, "ioctl", ioctl)
     monkeypatch.setattr(v4l2.cv2, "VideoCapture", Capture)
@@ -152,7 +170,8 @@ def controls(monkeypatch, tmp_path):
 
 def test_a_camera_keeps_to_what_it_was_set_to(controls):
     open_source("v4l2:0,exposure=60,gain=20").open()
-    assert {control: controls[control] for control in v4l2.AUTOMATIC} == v4l2.AUTOMATIC
+    for control, off in v4l2.AUTOMATIC.values():
+        assert controls[control] == off
     assert controls[v4l2.CONTROLS["exposure"][0]] == 60
     assert controls[v4l2.CONTROLS["gain"][0]] == 20
 
@@ -167,3 +186,48 @@ def test_a_camera_keeps_to_what_it_was_set_to(controls):
 def test_what_a_camera_cannot_do_is_named(controls, settings, reason):
     with pytest.raises(CameraError, match=reason):
         open_source(f"v4l2:0,{settings}").open()
+
+
+@pytest.mark.parametrize("name", v4l2.AUTOMATIC)
+def test_an_automatic_control_that_stays_on_is_named(controls, name):
+    controls["stuck"], _ = v4l2.AUTOMATIC[name]
+    with pytest.raises(CameraError, match=f"automatic {name} stays on"):
+        open_source("v4l2:0").open()
+
+
+def test_a_setting_that_the_camera_does_not_keep_is_named(controls):
+    controls["stuck"] = v4l2.CONTROLS["gain"][0]
+    with pytest.raises(CameraError, match="refuses gain=20"):
+        open_source("v4l2:0,gain=20").open()
+
+
+def test_a_rate_that_the_camera_does_not_have_is_named(controls, monkeypatch):
+    monkeypatch.setattr(Capture, "rate", 30.0)
+    with pytest.raises(CameraError, match=r"30 frames per second, not 60; .*rate=30"):
+        open_source("v4l2:0").open()
+    open_source("v4l2:0,rate=30").open()
+
+
+def test_frames_carry_the_driver_s_time_stamps(controls, monkeypatch):
+    """A reader that is served late does not make frames later."""
+    began = time.monotonic()
+    stamps = began + np.arange(8) / 60.0
+    monkeypatch.setattr(Capture, "stamps", iter(stamps))
+    source = open_source("v4l2:0", latency=0.02)
+    source.open()
+    taken = []
+    for k, stamp in enumerate(stamps):
+        late = 0.003 + 0.05 * (k == 4)
+        time.sleep(max(stamp + late - time.monotonic(), 0.0))
+        taken.append(source.read().taken)
+    off = np.array(taken) - stamps
+    assert np.ptp(off[1:]) < 0.004
+    assert off[-1] == pytest.approx(0.003 - 0.02, abs=0.003)
+
+
+def test_time_stamps_of_another_clock_are_not_used(controls, monkeypatch):
+    monkeypatch.setattr(Capture, "stamps", iter([1.7e9, 0.0, -5.0]))
+    source = open_source("v4l2:0", latency=0.02)
+    source.open()
+    for _ in range(3):
+        assert source.read().taken == pytest.approx(time.monotonic() - 0.02, abs=0.01)

@@ -1,12 +1,11 @@
 """A disk that takes nothing more: matches and studies go on, and say so."""
 
-import contextlib
 import errno
 import json
 import os
-import resource
 
 import pytest
+from disks import largest_file
 from pages import line
 from study_steps import answer, consent, enter, plan_writer, play, stage
 
@@ -17,15 +16,6 @@ from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.study.answers import read_answers
 from marl_airhockey.study.archive import DIARY, diaries
 from marl_airhockey.study.study import open_study
-
-
-@contextlib.contextmanager
-def largest_file(size):
-    """Let the system refuse larger files, which is an error as of a full disk."""
-    usual = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, usual[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, usual)
 
 
 def run_a_match(session, client, ticks):
@@ -53,7 +43,7 @@ def test_a_match_goes_on_unrecorded(table, tmp_path):
         recorder._writer._flushed = 0.0
         run_a_match(table, client, 1)
         # A thread writes; the first step after it has failed says so.
-        recorder._writer._disk.submit(int).result()
+        recorder._writer._disk._thread.submit(int).result()
         run_a_match(table, client, 1)
     assert table.match.phase == "play"
     state = json.loads(client.frame)

@@ -8,6 +8,7 @@ each frame shows the newest picture at the beginning of its step.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from marl_airhockey.data.exchange.seats import (
     playable,
 )
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
+from marl_airhockey.data.film import episodes_without_film
 from marl_airhockey.make import parallel_env
 from marl_airhockey.types import Array
 
@@ -65,8 +67,15 @@ def export_lerobot(
         writer = LeRobotWriter(folder, round(rate), _names(head, seat))
         for path, episode in episodes_with_steps(files):
             check_seat(episode, seat)
+            cut = episodes_without_film(path, [episode])
+            if cut:
+                words = f"{cut[episode.index]}; left out"
+                warnings.warn(words, RuntimeWarning, stacklevel=2)
+                continue
             frames, last = _frames(path, episode, seat)
             writer.add(frames, last, _task(head), *_film(path, episode))
+        if not writer.episodes:
+            raise ValueError(f"{files[0]}: the film ends before every episode")
         ours = {**playable(head), "scenario": head["scenario"], "seat": seat}
         writer.close({**ours, "backend": head["backend"]})
     return final

@@ -10,11 +10,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from marl_airhockey.core.recording import Columns
 from marl_airhockey.data.film import FilmFrames
+from marl_airhockey.render.mp4 import Mp4Writer
 from marl_airhockey.types import Array
 
 CODE = "v3.0"
@@ -54,6 +54,11 @@ class LeRobotWriter:
         self._frames = self._file = 0
         self._table: Any = None
         self._film: FilmFrames | None = None
+
+    @property
+    def episodes(self) -> int:
+        """Number of episodes that were added."""
+        return len(self._rows)
 
     def add(
         self,
@@ -152,19 +157,17 @@ class LeRobotWriter:
         if self._film is None or self._film.path != film:
             self._film = FilmFrames(film)
         path = self._path(f"videos/{CAMERA}", number, "mp4")
-        writer: Any = None
+        writer = Mp4Writer(path, self._rate)
         kept, every = [], max(len(pictures) // SAMPLED, 1)
         for k, picture in enumerate(pictures):
             image = self._film.picture(int(picture))
-            if writer is None:
-                height, width = image.shape[:2]
-                code = cv2.VideoWriter.fourcc(*"mp4v")
-                writer = cv2.VideoWriter(str(path), code, self._rate, (width, height))
+            if not k:
+                height, width = (2 * (size // 2) for size in image.shape[:2])
                 self._features[CAMERA] = _video(height, width, self._rate)
-            writer.write(image)
+            writer.append(image[..., ::-1])
             if k % every == 0:
                 kept.append(image[::4, ::4, ::-1].reshape(-1, 3) / 255.0)
-        writer.release()
+        writer.close()
         found = _stats(np.concatenate(kept))
         # As images: channels first, one value for all pixels.
         lists = {n: [[[x]] for x in v] for n, v in found.items() if n != "count"}
@@ -260,7 +263,7 @@ def _video(height: int, width: int, rate: int) -> dict[str, Any]:
         "info": {
             "video.height": height,
             "video.width": width,
-            "video.codec": "mpeg4",
+            "video.codec": "h264",
             "video.pix_fmt": "yuv420p",
             "video.is_depth_map": False,
             "video.fps": rate,

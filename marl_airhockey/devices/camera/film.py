@@ -1,13 +1,15 @@
 """Film: all frames of a camera in a video file that stays readable after a kill.
 
 A text file next to it has a line for each frame: the time at which it was taken, s,
-monotonic clock. The video's constant rate does not show missing frames.
+monotonic clock. The video has the times since its first frame.
 """
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import warnings
+from fractions import Fraction
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -15,17 +17,46 @@ from typing import Any
 import cv2
 import numpy as np
 
+from marl_airhockey.core.errors import require
 from marl_airhockey.devices.camera.camera import Camera, Frame
 from marl_airhockey.types import Array
 
 SUFFIX = ".mkv"
 """Suffix of the files: Matroska with Motion JPEG, readable as far as it was written"""
-FIRST = 4
-"""Number of frames from which the rate of a camera is measured"""
+TICK, RATE = Fraction(1, 1_000_000), 30
+"""Unit of a frame's time, s, and the rate that the file names; times are the frames'
+own"""
 MOST = 90
 """Largest number of frames in the queue: 80 MB of 640 x 480"""
 QUALITY = 92
 """JPEG quality"""
+
+
+class _Disk:
+    """File whose first error of writing is kept: PyAV would raise one of its own.
+
+    Args:
+        path: Path of the file.
+        broken: List to which the first error is added.
+    """
+
+    def __init__(self, path: Path, broken: list[OSError]) -> None:
+        self._file, self._broken = path.open("wb", buffering=0), broken
+        self.seek, self.tell, self.close = (
+            self._file.seek,
+            self._file.tell,
+            self._file.close,
+        )
+
+    def write(self, data: bytes) -> int:
+        """Write all of some data, or nothing more after the first error."""
+        left = memoryview(data)
+        try:
+            while left and not self._broken:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            self._broken.append(error)
+        return len(data)
 
 
 class Film:
@@ -37,13 +68,20 @@ class Film:
     """
 
     def __init__(self, camera: Camera, path: Path) -> None:
+        require("av", "video")
+        import av  # noqa: F401  The first import takes a tenth of a second.
+
         self._camera, self._path = camera, path
         self._waiting: SimpleQueue[Frame | None] = SimpleQueue()
         self._dropped = 0
-        self._writer: Any = None
+        self._container: Any = None
+        self._stream: Any = None
+        self._file: Any = None
+        self._broken: list[OSError] = []
+        self._began, self._pts = 0.0, -1000
         self._times = times_file(path).open("w", buffering=1)
         self._last: tuple[int, float] | None = None
-        self._failed = False
+        self._failure, self._kept = "", 0
         self._thread = threading.Thread(target=self._write, name="film", daemon=True)
         self._thread.start()
         camera.listeners.append(self._take)
@@ -56,8 +94,9 @@ class Film:
     @property
     def trouble(self) -> str:
         """Description of what is missing in the file; "" if it is complete."""
-        if self._failed:
-            return f"{self._path}: no video can be written to this path"
+        if self._failure:
+            kept, why = self._kept, self._failure
+            return f"{self._path}: ends after {kept} pictures: {why}"
         if self._dropped:
             return (
                 f"{self._path}: {self._dropped} pictures are missing, as they arrived "
@@ -66,55 +105,77 @@ class Film:
         return ""
 
     def _take(self, frame: Frame) -> None:
+        if self._failure:
+            return
         if self._waiting.qsize() < MOST:
             self._waiting.put(frame)
         else:
             self._dropped += 1
 
     def _write(self) -> None:
-        """Write frames as they arrive; the first few tell the rate of the file."""
-        first: list[Frame] = []
-        while (frame := self._waiting.get()) is not None:
-            first.append(frame)
-            if self._writer is None and len(first) < FIRST:
-                continue
-            if self._writer is None and not self._open(first):
-                return
-            self._append(first)
-            first.clear()
-        if first and self._open(first):
-            self._append(first)
+        """Write frames as they arrive, until the disk takes no more."""
+        try:
+            while (frame := self._waiting.get()) is not None:
+                self._append(frame)
+        except OSError as error:
+            # What is written stays.
+            self._failure = error.strerror or str(error)
 
-    def _append(self, frames: list[Frame]) -> None:
-        """Append some frames and their times."""
+    def _append(self, frame: Frame) -> None:
+        """Append a frame and its time.
+
+        Raises:
+            OSError: The disk takes no more.
+        """
+        import av
+
+        if self._stream is None:
+            self._open(frame)
+        quality = [cv2.IMWRITE_JPEG_QUALITY, QUALITY]
+        packet = av.Packet(cv2.imencode(".jpg", frame.image, quality)[1].tobytes())
+        packet.stream, packet.time_base, packet.is_keyframe = self._stream, TICK, True
+        # A time of the file has a resolution of 1 ms, and never goes back.
+        pts = round((frame.taken - self._began) / TICK)
+        self._pts = packet.pts = packet.dts = max(pts, self._pts + 1000)
+        self._container.mux_one(packet)
+        if self._broken:
+            raise self._broken[0]
+        self._keep_time()
         count = 0 if self._last is None else self._last[0] + 1
-        for each in frames:
-            self._writer.write(each.image)
-            self._times.write(f"{each.taken:.6f}\n")
-            self._last = count, each.taken
-            count += 1
+        self._last = count, frame.taken
 
-    def _open(self, frames: list[Frame]) -> bool:
-        """Open the file at the rate of some frames; return whether that worked."""
-        steps = frames[-1].number - frames[0].number
-        rate = steps / max(frames[-1].taken - frames[0].taken, 1e-3)
-        height, width = frames[0].image.shape[:2]
-        code = cv2.VideoWriter.fourcc(*"MJPG")
-        self._writer = cv2.VideoWriter(
-            str(self._path), code, max(round(rate, 2), 1.0), (width, height)
-        )
-        self._writer.set(cv2.VIDEOWRITER_PROP_QUALITY, QUALITY)
-        self._failed = not self._writer.isOpened()
-        return not self._failed
+    def _keep_time(self) -> None:
+        """Write the time of the newest frame: it is on the disk with the next one."""
+        if self._last is not None:
+            self._times.write(f"{self._last[1]:.6f}\n")
+            self._kept += 1
+
+    def _open(self, first: Frame) -> None:
+        """Open the file for frames like the first."""
+        import av
+
+        self._file = _Disk(self._path, self._broken)
+        # Each frame is on the disk at once, so that a kill loses none.
+        options = {"flush_packets": "1", "cluster_time_limit": "1"}
+        self._container = av.open(self._file, "w", format="matroska", options=options)
+        self._stream = self._container.add_stream("mjpeg", RATE)
+        height, width = first.image.shape[:2]
+        self._stream.width, self._stream.height = width, height
+        self._stream.pix_fmt, self._stream.time_base = "yuvj420p", TICK
+        self._began = first.taken
 
     def close(self) -> None:
         """Close the file; warn if frames are missing in it."""
         self._camera.listeners.remove(self._take)
         self._waiting.put(None)
         self._thread.join(5.0)
-        self._times.close()
-        if self._writer is not None:
-            self._writer.release()
+        if self._container is not None:
+            self._container.close()
+            self._file.close()
+            if not self._broken:
+                self._keep_time()
+        with contextlib.suppress(OSError):
+            self._times.close()
         if self.trouble:
             warnings.warn(self.trouble, RuntimeWarning, stacklevel=2)
 

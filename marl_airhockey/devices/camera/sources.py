@@ -34,31 +34,40 @@ class FileSource:
 
     Args:
         path: Path of the file.
-        realtime: Whether to wait between frames, as given by the file's rate.
+        realtime: Whether to wait between frames until their times.
     """
 
     def __init__(self, path: str | Path, realtime: bool = True) -> None:
         self._path, self._realtime = Path(path), realtime
         self._capture: Any = None
-        self._count, self._began, self.rate = 0, 0.0, 0.0
+        self._count, self._began, self._first, self.rate = 0, 0.0, 0.0, 0.0
 
     def open(self) -> None:
         self._capture = cv2.VideoCapture(str(self._path))
         if not self._path.exists() or not self._capture.isOpened():
             raise CameraError(f"{self._path}: there is no video that OpenCV can read")
         self.rate = self._capture.get(cv2.CAP_PROP_FPS) or 30.0
-        """Frames a second."""
-        self._began = time.monotonic()
+        """Mean number of frames a second."""
+        self._began = time.monotonic() if self._realtime else 0.0
 
     def read(self) -> Frame | None:
         found, image = self._capture.read()
         if not found:
             return None
-        due = self._began + self._count / self.rate
+        due = self._began + self._position()
         if self._realtime:
             time.sleep(max(due - time.monotonic(), 0.0))
         self._count += 1
         return Frame(image, due, self._count - 1)
+
+    def _position(self) -> float:
+        """Return the time of the frame that was read, s since the first."""
+        now = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
+        if not self._count:
+            self._first = now
+        steady = self._count / self.rate
+        # Some files have no times.
+        return now - self._first if now > self._first else steady
 
     def close(self) -> None:
         if self._capture is not None:

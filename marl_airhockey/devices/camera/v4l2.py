@@ -23,12 +23,20 @@ from marl_airhockey.devices.camera.camera import CameraError, Frame
 LATENCY = 0.025
 """Latency without a measurement, from the middle of an exposure until its frame has
 arrived, s: half an exposure of 8 ms, the readout and the transfer of a PS Eye"""
-SET_CONTROL = 0xC008561C
-"""Request VIDIOC_S_CTRL of the kernel's interface, videodev2.h"""
+GET_CONTROL, SET_CONTROL = 0xC008561B, 0xC008561C
+"""Requests VIDIOC_G_CTRL and VIDIOC_S_CTRL of the kernel's interface, videodev2.h"""
+SLOWER = 0.05
+"""Share by which the frame rate may differ from the requested one"""
+RECENT = 1.0
+"""Age of a driver's time stamp beyond which it is of another clock, s"""
 CONTROL = struct.Struct("=Ii")
 """Number of a control and its value"""
-AUTOMATIC = {0x009A0901: 1, 0x00980912: 0, 0x0098090C: 0}
-"""Values that switch automatic exposure, gain and white balance off"""
+AUTOMATIC = {
+    "exposure": (0x009A0901, 1),
+    "gain": (0x00980912, 0),
+    "white balance": (0x0098090C, 0),
+}
+"""Automatic controls, and the values that switch them off"""
 CONTROLS = {
     "exposure": (0x009A0902, 0x00980911),
     "gain": (0x00980913,),
@@ -97,6 +105,7 @@ class CapturedSource:
         self._device, self._path = device, Path(f"/dev/video{device}")
         self._settings = settings or CaptureSettings()
         self._latency, self._count = latency, 0
+        self._transfer = RECENT
         self._capture: Any = None
 
     def open(self) -> None:
@@ -121,6 +130,13 @@ class CapturedSource:
                 f"{self._path} delivers frames of {width} x {height}, not of "
                 f"{settings.width} x {settings.height}; use a size that it has: "
                 f"v4l2:{self._device},width={width},height={height}"
+            )
+        rate = capture.get(cv2.CAP_PROP_FPS)
+        if abs(rate - settings.rate) > SLOWER * settings.rate:
+            raise CameraError(
+                f"{self._path} delivers {rate:g} frames per second, not "
+                f"{settings.rate}; use a rate that it has at this size: "
+                f"v4l2:{self._device},rate={rate:.0f}"
             )
         self._set_controls()
 
@@ -149,14 +165,21 @@ class CapturedSource:
         """
         descriptor = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
         try:
-            for control, value in AUTOMATIC.items():
+            for name, (control, value) in AUTOMATIC.items():
                 # Some cameras lack some of these controls.
                 _set_control(descriptor, control, value)
+                if _get_control(descriptor, control) not in (None, value):
+                    raise CameraError(
+                        f"{self._path}: automatic {name} stays on, "
+                        "which would change the calibrated colours; switch it off "
+                        "with v4l2-ctl, or use another camera"
+                    )
             for name, controls in CONTROLS.items():
                 value = getattr(self._settings, name)
                 if value is None:
                     continue
-                if not any(_set_control(descriptor, c, value) for c in controls):
+                taken = [c for c in controls if _set_control(descriptor, c, value)]
+                if not any(_get_control(descriptor, c) == value for c in taken):
                     raise CameraError(
                         f"{self._path} refuses {name}={value}; see v4l2-ctl "
                         f"--device {self._device} --list-ctrls"
@@ -169,11 +192,33 @@ class CapturedSource:
         if not found:
             raise CameraError(f"{self._path} delivers no more frames")
         self._count += 1
-        return Frame(image, time.monotonic() - self._latency, self._count - 1)
+        return Frame(image, self._arrival() - self._latency, self._count - 1)
+
+    def _arrival(self) -> float:
+        """Return the time at which the frame that was read arrives if nothing waits, s.
+
+        The driver's time stamp does not depend on when this process is served. The
+        latency counts from the least time between the stamp and the arrival.
+        """
+        now = time.monotonic()
+        stamp: float = 1e-3 * self._capture.get(cv2.CAP_PROP_POS_MSEC)
+        if not 0.0 <= now - stamp < RECENT:
+            return now
+        self._transfer = min(self._transfer, now - stamp)
+        return stamp + self._transfer
 
     def close(self) -> None:
         if self._capture is not None:
             self._capture.release()
+
+
+def _get_control(descriptor: int, control: int) -> int | None:
+    """Return the value of a control; None if the camera lacks it."""
+    try:
+        packed = fcntl.ioctl(descriptor, GET_CONTROL, CONTROL.pack(control, 0))
+    except OSError:
+        return None
+    return int(CONTROL.unpack(packed)[1])
 
 
 def _set_control(descriptor: int, control: int, value: int) -> bool:
