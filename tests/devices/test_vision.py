@@ -1,11 +1,15 @@
 """Vision on pictures of a table that is known: how exact, and what it refuses."""
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.devices.camera import Frame
 from marl_airhockey.devices.vision import Colour, Detector
+from marl_airhockey.devices.vision.boards import lens_from_boards, make_board
 from marl_airhockey.devices.vision.calibration import (
     find_tags,
     moved,
@@ -152,7 +156,7 @@ def test_a_picture_of_something_else_is_named(camera):
     assert "none of the table's tags" in view_trouble(VIEW, [image * 0 + 120], KNOWN)
     assert "dark (mean 3 of 255)" in view_trouble(VIEW, [image * 0 + 3], KNOWN)
     shifted = np.roll(image, 6, axis=1)
-    assert "px from where they were" in view_trouble(VIEW, [shifted], KNOWN)
+    assert "from where they were" in view_trouble(VIEW, [shifted], KNOWN)
 
 
 def test_a_second_puck_is_seen(camera, detector):
@@ -163,3 +167,69 @@ def test_a_second_puck_is_seen(camera, detector):
     camera.left = None
     places = sorted(seen.place.tolist() for seen in found)
     np.testing.assert_allclose(places, [[0.2, 0.1], [0.55, -0.25]], atol=0.003)
+
+
+def board_views(tilt, spread, far=(0.4, 0.8), count=12):
+    """Return corners and their numbers of a board in some poses before a camera.
+
+    Args:
+        tilt: Largest tilt, deg.
+        spread: Part of the picture over which the boards are spread.
+        far: Least and largest distance, m.
+        count: Number of pictures.
+    """
+    rng, lens = np.random.default_rng(0), VIEW.lens
+    corners = np.asarray(make_board().getChessboardCorners(), float)
+    middle, views = corners.mean(0), []
+    while len(views) < count:
+        angle, turn = (
+            rng.uniform(0.0, 2 * np.pi),
+            np.radians(rng.uniform(0.7, 1) * tilt),
+        )
+        lean = np.array([np.cos(angle), np.sin(angle), 0.0]) * turn
+        z = rng.uniform(*far)
+        aside = spread * z * rng.uniform(-1, 1, 2) * (0.45, 0.33)
+        pixels, _ = cv2.projectPoints(
+            (corners - middle), lean, np.array([*aside, z]), *lens.arrays
+        )
+        pixels = pixels.reshape(-1, 2)
+        inside = ((pixels > 2) & (pixels < np.array(lens.size) - 2)).all(1)
+        if inside.sum() >= 12:
+            noisy = pixels[inside] + rng.normal(0.0, 0.15, (inside.sum(), 2))
+            views.append((noisy, np.flatnonzero(inside)))
+    return views
+
+
+def test_tilted_boards_in_all_parts_of_the_picture_determine_the_lens():
+    lens = lens_from_boards(board_views(35.0, 1.0), VIEW.lens.size)
+    focal = VIEW.lens.matrix[0][0]
+    assert lens.matrix[0][0] == pytest.approx(focal, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        ({"tilt": 2.0, "spread": 1.0}, "tilted by at most . deg"),
+        ({"tilt": 10.0, "spread": 1.0}, "tilted by at most 10 deg"),
+        ({"tilt": 35.0, "spread": 0.1}, "of the picture's width"),
+        ({"tilt": 17.0, "spread": 1.0, "far": (1.4, 1.6), "count": 8}, "uncertain by"),
+    ],
+)
+def test_boards_that_determine_no_lens_are_refused(poses, words):
+    with pytest.raises(ValueError, match=words):
+        lens_from_boards(board_views(**poses), VIEW.lens.size)
+
+
+@pytest.mark.parametrize("shift", [(0.003, 0.0), (0.0, -0.003), (0.0022, 0.0022)])
+def test_a_camera_that_moved_by_three_millimetres_is_noticed(shift):
+    known = {k: tag_corners(place) for k, place in tag_places(TABLE).items()}
+
+    def picture(view):
+        camera = TableCamera(TABLE, view, np.array([-1.2, 0.0]), seed=4)
+        return camera.photograph(Seen(None, np.zeros(2), np.zeros(2), np.zeros(2)), 1)
+
+    assert view_trouble(VIEW, [picture(VIEW)], known) == ""
+    x, y, z = VIEW.translation
+    moved = replace(VIEW, translation=(x + shift[0], y + shift[1], z))
+    words = view_trouble(VIEW, [picture(moved)], known)
+    assert "mm from where they were on the table" in words

@@ -18,6 +18,13 @@ LEAST_CORNERS, LEAST_VIEWS = 8, 8
 """Least number of corners in a frame, and least number of such frames"""
 WORST = 1.0
 """Largest accepted error of the corners, px"""
+TILTED = 15.0
+"""Angle between the board and the image plane that some frame must have, deg: boards
+that face the camera fit any focal length"""
+COVERED = 0.6
+"""Share of the frame's width and height over which the corners must be spread"""
+UNCERTAIN = 0.02
+"""Largest accepted standard deviation of the focal length, as a share"""
 
 
 def make_board() -> cv2.aruco.CharucoBoard:
@@ -48,7 +55,8 @@ def lens_from_boards(
         size: Width and height of the frames, px.
 
     Raises:
-        ValueError: Too few frames, or corners that no lens fits.
+        ValueError: Too few frames, corners that no lens fits, or frames that do not
+            determine one: without tilt, or in a part of the picture alone.
     """
     if len(views) < LEAST_VIEWS:
         raise ValueError(
@@ -58,13 +66,49 @@ def lens_from_boards(
     positions = np.asarray(make_board().getChessboardCorners(), np.float32)
     points = [positions[numbers] for _, numbers in views]
     pixels = [corners.astype(np.float32) for corners, _ in views]
-    found = cv2.calibrateCamera(points, pixels, size, None, None)
-    error, matrix, distortion = found[:3]
+    empty = np.eye(3), np.zeros(5)
+    found = cv2.calibrateCameraExtended(points, pixels, size, *empty)
+    error, matrix, distortion, rotations, _, deviations = found[:6]
     if error > WORST:
         raise ValueError(
             f"the board's corners fit to {error:.2f} px, {WORST:.1f} px is allowed; "
             "make the sheet flat and hold it still"
         )
+    _check_poses(rotations, np.concatenate(pixels), size)
+    uncertain = float((deviations[:2, 0] / matrix.diagonal()[:2]).max())
+    if not uncertain <= UNCERTAIN:
+        raise ValueError(
+            f"the focal length is uncertain by {uncertain:.1%}, {UNCERTAIN:.0%} is "
+            "allowed; take more pictures, with the board nearer and more tilted"
+        )
     rows = tuple(tuple(float(x) for x in row) for row in matrix)
     five = tuple(float(x) for x in distortion.ravel()[:5])
     return Lens(rows, five, size, float(error))  # type: ignore[arg-type]
+
+
+def _check_poses(
+    rotations: Sequence[Array], pixels: Array, size: tuple[int, int]
+) -> None:
+    """Refuse poses of the board that do not determine a lens.
+
+    Args:
+        rotations: (3,) rotation vectors of the board in each frame, rad.
+        pixels: (n, 2) corners in all frames, px.
+        size: Width and height of the frames, px.
+
+    Raises:
+        ValueError: No board is tilted, or the corners are in a part of the frame alone.
+    """
+    facing = [abs(cv2.Rodrigues(vector)[0][2, 2]) for vector in rotations]
+    tilt = float(np.degrees(np.arccos(min(facing))))
+    if tilt < TILTED:
+        raise ValueError(
+            f"the board is tilted by at most {tilt:.0f} deg in the pictures; tilt it "
+            f"by {TILTED:.0f} to 45 deg in some of them, in different directions"
+        )
+    width, height = np.ptp(pixels, axis=0) / size
+    if min(width, height) < COVERED:
+        raise ValueError(
+            f"the board was in {width:.0%} of the picture's width and {height:.0%} of "
+            f"its height; hold it in all parts, at least {COVERED:.0%}"
+        )

@@ -20,6 +20,9 @@ WORST = 2.0
 """Largest accepted error of a calibration's fit, px"""
 MOVED = 2.0
 """Error of the tags, px, above which the camera or the table has moved"""
+SHIFTED = 0.002
+"""Mean shift of the tags on the table above which it has, m. Without a movement it is
+below 0.3 mm in the virtual lab."""
 DARK = 40.0
 """Mean brightness of a frame, of 255, below which it is dark"""
 
@@ -132,7 +135,8 @@ def view_trouble(
         )
     if not known:
         return ""
-    off = [moved(view, find_tags(picture), known) for picture in pictures]
+    tags = [find_tags(picture) for picture in pictures]
+    off = [moved(view, each, known) for each in tags]
     seen = [error for error in off if np.isfinite(error)]
     if not seen:
         light = float(np.mean([picture.mean() for picture in pictures]))
@@ -140,6 +144,13 @@ def view_trouble(
         return (
             f"none of the table's tags is seen{dark if light < DARK else ''}; is this "
             "the camera over the table, are the lights on, is the lens uncovered?"
+        )
+    shifts = [shifted(view, each, known) for each in tags if each.keys() & known.keys()]
+    shift = float(np.linalg.norm(np.mean(shifts, 0)))
+    if shift > SHIFTED:
+        return (
+            f"the tags are {1e3 * shift:.1f} mm from where they were on the table; the "
+            "camera or the table was moved: calibrate again"
         )
     if np.median(seen) > MOVED:
         return (
@@ -164,3 +175,17 @@ def moved(view: View, seen: Mapping[int, Array], known: Mapping[int, Array]) -> 
     points = np.column_stack([positions, np.zeros(len(positions))])
     off = view.project(points) - np.concatenate([seen[k] for k in both])
     return float(np.median(np.linalg.norm(off, axis=1)))
+
+
+def shifted(view: View, seen: Mapping[int, Array], known: Mapping[int, Array]) -> Array:
+    """Return the mean shift (2,) of the tags' corners on the table, m.
+
+    Args:
+        view: View of the calibration.
+        seen: Corners (4, 2) by number, px, as `find_tags` returns them.
+        known: Corners (4, 2) by number, table frame, m, at least one of them seen.
+    """
+    both = sorted(seen.keys() & known.keys())
+    places = view.to_table(np.concatenate([seen[k] for k in both]))
+    off = places - np.concatenate([known[k] for k in both])
+    return np.asarray(off.mean(0))
