@@ -50,6 +50,10 @@ class Recorder:
         # Here, and not in the first step of a match.
         require("pyarrow", EXTRA)
         warm_up()
+        if camera is not None:
+            require("av", "video")
+            import av  # noqa: F401
+
         self._folder, self._camera = folder, camera
         self._film: Film | None = None
         self._keep, self._kept = keep, deque[Path]()

@@ -41,7 +41,7 @@ BLIND = 0.3
 DELAYED = 0.15
 """Time from an exposure until its frame arrives after which an episode ends, s"""
 LATE = 0.02
-"""Delay of a command after the end of its last step that is logged, s"""
+"""Time from the end of a step to the next command above which it is logged, s"""
 LOST = 2.0
 """Time for which a puck may be unseen, s"""
 FIRST = 3
@@ -311,13 +311,12 @@ class RealBackend(Backend):
         Args:
             began: Time at which the step began, s.
         """
-        late = began - self._due
-        if late > LATE:
+        took = began - self._moment
+        if took > LATE:
             log.warning(
-                "real table: a command is %.0f ms late: policy, observation and "
-                "recording took %.0f ms since the last step",
-                1e3 * late,
-                1e3 * (began - self._moment),
+                "real table: a command is late: policy, observation and recording "
+                "took %.0f ms since the last step",
+                1e3 * took,
             )
 
     def _trouble(self, now: float) -> str:
