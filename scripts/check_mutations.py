@@ -214,6 +214,48 @@ FAULTS = [
         "torch.cat([after, action], -1)).amax(0)",
         "learn/test_offline_losses.py",
     ),
+    Fault(
+        "force mode stays on",
+        "marl_airhockey/devices/robot/driver.py",
+        "self._arm.release(self._motion.pose)",
+        "pass",
+        "lab/test_rest.py",
+    ),
+    Fault(
+        "speed slider ignored",
+        "marl_airhockey/devices/robot/motion.py",
+        "self.shaper.scale_speed(self.scaling)",
+        "self.shaper.scale_speed(1.0)",
+        "lab/test_speed_slider.py",
+    ),
+    Fault(
+        "target runs ahead of the arm",
+        "marl_airhockey/devices/robot/motion.py",
+        "> self.most\n        if too_far:",
+        "> 9.0 * self.most\n        if too_far:",
+        "lab/test_fault_atlas.py lab/test_speed_slider.py",
+    ),
+    Fault(
+        "mirrored mounting accepted",
+        "marl_airhockey/devices/robot/mounting.py",
+        " or np.linalg.det(rotation) < 0.0",
+        "",
+        "devices/test_rig.py",
+    ),
+    Fault(
+        "repeated pictures searched",
+        "marl_airhockey/devices/vision/watcher.py",
+        "None if repeated else self._detector.find(frame)",
+        "self._detector.find(frame)",
+        "lab/test_no_news.py",
+    ),
+    Fault(
+        "two clients write one input",
+        "marl_airhockey/lab/ur_controller/rtde_connection.py",
+        "if not recipe.known or TAKEN in types:",
+        "if not recipe.known:",
+        "lab/test_ur_protocol.py",
+    ),
 ]
 
 

@@ -134,7 +134,8 @@ def summary_of(rows: list[dict[str, Any]]) -> list[dict[str, str]]:
     pairs: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         if "+" in row["faults"]:
-            reason = re.sub(r" for [\d.]+ s$", "", row["reason"]) or "plays on"
+            words = row["reason"].split(";")[0]
+            reason = re.sub(r"[\d.]*\d", "N", words) or "plays on"
             pairs.setdefault(reason, []).append(row)
 
     def worst(found: list[dict[str, Any]], column: str) -> str:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from driven import STEP, UP, drive, moving_robot
 
 from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.devices.robot import (
@@ -21,8 +22,6 @@ from marl_airhockey.lab.ur_controller.arm import JOINT_ACCELERATION
 from marl_airhockey.lab.ur_controller.plant import PlantReading
 from marl_airhockey.lab.ur_controller.safety import Safety
 
-STEP = 0.05
-UP = np.array([0.0, 0.5])
 LATENCY = {
     **dict.fromkeys(["protective_stop", "emergency_stop", "power_off"], 0.004),
     **dict.fromkeys(["silent_robot", "delayed_packets", "dropped_connection"], 0.075),
@@ -31,21 +30,9 @@ LATENCY = {
 """Longest time until braking begins after a fault of the robot, s"""
 
 
-def drive(robot, velocity=UP, seconds=0.4):
-    for _ in range(round(seconds / STEP)):
-        robot.send_action(velocity, STEP)
-        robot.advance(STEP)
-
-
 @pytest.fixture
 def robot():
-    """A robot that presses its paddle on the table and moves at 0.5 m/s."""
-    made = EmulatedRobot()
-    assert made.drive_to(np.array(made.setup.home) - (0.0, 0.25))
-    drive(made, np.zeros(2), 1.2)
-    drive(made)
-    assert np.linalg.norm(made.true_velocity) == pytest.approx(0.5, abs=0.02)
-    return made
+    return moving_robot()
 
 
 def until_braking(robot, seconds=0.3):

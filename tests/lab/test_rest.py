@@ -2,30 +2,17 @@
 
 import numpy as np
 import pytest
+from driven import STEP, UP, drive, moving_robot
 
 from marl_airhockey.devices.robot import DriverState, Fault
 from marl_airhockey.devices.robot.kinematics import matrix_of, vector_of
 from marl_airhockey.devices.robot.supervisor import OFF_TABLE
 from marl_airhockey.lab.emulated_robot import EmulatedRobot
 
-STEP = 0.05
-UP = np.array([0.0, 0.5])
-
-
-def drive(robot, velocity=UP, seconds=0.4):
-    for _ in range(round(seconds / STEP)):
-        robot.send_action(velocity, STEP)
-        robot.advance(STEP)
-
 
 @pytest.fixture
 def robot():
-    """A robot that presses its paddle on the table and moves at 0.5 m/s."""
-    made = EmulatedRobot()
-    assert made.drive_to(np.array(made.setup.home) - (0.0, 0.25))
-    drive(made, np.zeros(2), 1.2)
-    drive(made)
-    return made
+    return moving_robot()
 
 
 def remove_table(robot):
@@ -194,3 +181,34 @@ def test_the_force_of_a_running_robot_is_on_the_table_alone(robot):
     robot.enable()
     drive(robot, np.zeros(2), 1.2)
     assert robot.get_observation().force == pytest.approx(5.0, abs=0.3)
+
+
+def test_the_reported_velocity_is_that_of_the_arm_in_force_mode(robot):
+    """Also while its servo target is far from where the force holds it."""
+    arm = robot.controller.arm
+    off, before = [], robot.true_position
+    robot.switch("puck_under_paddle")
+    for k in range(200):
+        if k % 25 == 0:
+            robot.send_action(UP * (1.0 if k < 60 else -1.0), STEP)
+        since = robot.now
+        robot.advance(0.002)
+        moved = (robot.true_position - before) / (robot.now - since)
+        told = robot.setup.mounting.rotate_to_table(np.array(arm.twist[:3]))
+        off.append(np.abs(moved - told).max())
+        before = robot.true_position
+    # While the driver waits for the controller, the mean of some periods counts.
+    assert np.quantile(off, 0.97) < 2e-3
+
+
+@pytest.mark.parametrize("stop", ["protective_stop", "emergency_stop", "power_off"])
+def test_a_stop_in_force_mode_does_not_jump(robot, stop):
+    remove_table(robot)
+    robot.controller.arm.target = robot.controller.arm.target + 0.05
+    before = robot.true_position
+    robot.switch(stop)
+    robot.advance(0.5)
+    moved = robot.true_position - before
+    # From 0.5 m/s, at 20 rad/s2 of the fastest joint.
+    assert np.linalg.norm(moved) < 0.02
+    assert abs(moved[2]) < 2e-3

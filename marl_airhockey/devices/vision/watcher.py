@@ -49,15 +49,15 @@ class Watcher:
     @property
     def trouble(self) -> str:
         """Reason why the camera's pictures are no news; "" if they are."""
-        if not self._repeats or not any(self._repeats):
-            return ""
+        recent = [*self._repeats]
         same = time.monotonic() - self._changed_at
-        if all([*self._repeats][-REPEATS:]):
+        if not any(recent):
+            return ""
+        if all(recent[-REPEATS:]):
             return f"camera: the same picture for {same:.1f} s" if same > STUCK else ""
-        if sum(self._repeats) >= REPEATS:
+        if sum(recent) >= REPEATS:
             return (
-                f"camera: {sum(self._repeats)} of {len(self._repeats)} pictures repeat "
-                "the one before"
+                f"camera: {sum(recent)} of {len(recent)} pictures repeat the one before"
             )
         return ""
 
