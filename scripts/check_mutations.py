@@ -233,7 +233,7 @@ FAULTS = [
         "marl_airhockey/devices/robot/motion.py",
         "> self.most\n        if too_far:",
         "> 9.0 * self.most\n        if too_far:",
-        "lab/test_fault_atlas.py lab/test_speed_slider.py",
+        "devices/test_motion.py",
     ),
     Fault(
         "mirrored mounting accepted",
