@@ -35,16 +35,26 @@ def episodes_without_film(
     film = path / FILM
     if not film.exists():
         return {}
-    count, found = count_frames(film), {}
-    for episode in episodes:
-        shown = episode.columns.get("frame", np.zeros(0))
-        last = int(shown.max(initial=-1))
-        if last >= count:
-            found[episode.index] = (
-                f"{path}: episode {episode.index}: the film ends {last + 1 - count} "
-                "pictures before it"
-            )
-    return found
+    count = count_frames(film)
+    gaps = {episode.index: film_gap(path, episode, count) for episode in episodes}
+    return {index: words for index, words in gaps.items() if words}
+
+
+def film_gap(path: Path, episode: RecordedEpisode, count: int) -> str:
+    """Return a message if the film ends before an episode; "" if it does not.
+
+    Args:
+        path: Folder of the recording.
+        episode: Episode of it.
+        count: Number of frames in the film.
+    """
+    last = int(episode.columns.get("frame", np.zeros(0)).max(initial=-1))
+    if last < count:
+        return ""
+    return (
+        f"{path}: episode {episode.index}: the film ends {last + 1 - count} pictures "
+        "before it"
+    )
 
 
 def count_frames(film: Path) -> int:

@@ -1,4 +1,4 @@
-"""What an arm is sent never runs ahead of it by more than it can close at its limit."""
+"""Sent positions are ahead of the arm by no more than it closes at its limit."""
 
 import numpy as np
 import pytest

@@ -21,6 +21,8 @@ from marl_airhockey.lab.ur_controller.faults import FAULTS
 from marl_airhockey.lab.ur_controller.safety import Safety
 
 STEP = 0.05
+SETUP = LabSetup()
+CONFIG = DriverConfig(ADDRESS, SETUP.mounting, SETUP.seat.reach)
 REPORTED = [name for name, fault in FAULTS.items() if fault.source]
 OF_CONNECTIONS = ("forgotten_recipes", "late_state")
 """Faults that only a client over the network meets"""
@@ -108,11 +110,9 @@ def test_an_arm_that_was_carried_away_is_not_driven_back():
     run.robot.advance(2.0)
     before = run.robot.true_position
     run.robot.recover()
-    run.robot.advance(0.5)
-    run.drive(0.3)
-    away = run.robot.fault is Fault.PROGRAM_LOST
-    assert away or np.linalg.norm(run.robot.true_position - before) < 0.3
-    assert run.top <= 1.02 * run.robot.config.limits.speed
+    run.robot.advance(1.0)
+    np.testing.assert_allclose(run.robot.true_position, before, atol=1e-3)
+    assert run.robot.fault in (Fault.PROGRAM_LOST, Fault.NONE)
 
 
 def test_a_robot_that_is_ready_keeps_its_program_alive():
@@ -126,12 +126,10 @@ def test_a_robot_that_is_ready_keeps_its_program_alive():
 @pytest.mark.slow
 def test_a_late_state_delays_the_start_and_moves_nothing():
     pytest.importorskip("rtde_control")
-    setup = LabSetup()
-    config = DriverConfig(ADDRESS, setup.mounting, setup.seat.reach)
     with emulator():
         before = status()["pose"]
         switch("late_state", "--address", ADDRESS)
-        with Robot(config) as robot:
+        with Robot(CONFIG) as robot:
             assert robot.state is DriverState.READY
             assert status()["pose"] == before
 
@@ -139,13 +137,11 @@ def test_a_late_state_delays_the_start_and_moves_nothing():
 @pytest.mark.slow
 def test_a_client_whose_recipes_are_forgotten_is_refused():
     pytest.importorskip("rtde_control")
-    setup = LabSetup()
-    config = DriverConfig(ADDRESS, setup.mounting, setup.seat.reach)
     with emulator():
         before = status()["pose"]
         switch("forgotten_recipes", "--address", ADDRESS)
         with pytest.raises(RobotError, match="program did not start"):
-            Robot(config).connect()
+            Robot(CONFIG).connect()
         assert status()["pose"] == before
 
 

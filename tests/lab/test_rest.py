@@ -1,4 +1,4 @@
-"""What each axis of the arm does in the states that promise rest, in emulated time."""
+"""Axes of the arm in the states that promise rest, in emulated time."""
 
 import numpy as np
 import pytest

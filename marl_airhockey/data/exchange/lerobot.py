@@ -29,7 +29,7 @@ from marl_airhockey.data.exchange.seats import (
     playable,
 )
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
-from marl_airhockey.data.film import episodes_without_film
+from marl_airhockey.data.film import count_frames, film_gap
 from marl_airhockey.make import parallel_env
 from marl_airhockey.types import Array
 
@@ -63,14 +63,15 @@ def export_lerobot(
             f"control_dt {head['control_dt']}: LeRobot takes whole frames per second"
         )
     final = named_folder(root, name)
+    films = {path: path / FILM for path in files if (path / FILM).exists()}
+    lengths = {path: count_frames(film) for path, film in films.items()}
     with whole_folder(final) as folder:
         writer = LeRobotWriter(folder, round(rate), _names(head, seat))
         for path, episode in episodes_with_steps(files):
             check_seat(episode, seat)
-            cut = episodes_without_film(path, [episode])
-            if cut:
-                words = f"{cut[episode.index]}; left out"
-                warnings.warn(words, RuntimeWarning, stacklevel=2)
+            gap = film_gap(path, episode, lengths[path]) if path in lengths else ""
+            if gap:
+                warnings.warn(f"{gap}; left out", RuntimeWarning, stacklevel=2)
                 continue
             frames, last = _frames(path, episode, seat)
             writer.add(frames, last, _task(head), *_film(path, episode))

@@ -95,8 +95,9 @@ class ServoSettings:
     """Largest speed of the compliant axis, m/s"""
     deviation: float = 0.085
     """Largest gap between the sent and the measured position, as the time in which the
-    paddle covers it at its speed limit, s. A UR5e needs 0.066 s. An arm that closes a
-    gap of 0.087 s reaches the speed limit, so a larger one could make it leap."""
+    paddle covers it at its speed limit, s. The emulated arm needs 0.067 s. An arm that
+    closes a gap of 0.087 s reaches the speed limit, so it would leap from a larger
+    one."""
 
     def __post_init__(self) -> None:
         # The first two: what the controller takes.
