@@ -201,6 +201,13 @@ FAULTS = [
         "lab/test_emulated_robot.py",
     ),
     Fault(
+        "a driver recovers by an old word",
+        "marl_airhockey/devices/robot/driver.py",
+        "if before is not DriverState.FAULT:",
+        "if False:",
+        "lab/test_emulated_robot.py",
+    ),
+    Fault(
         "last step is not recorded",
         "marl_airhockey/data/record.py",
         "value[i, : lengths[i]] for n",

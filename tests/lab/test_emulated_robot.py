@@ -161,6 +161,20 @@ def test_a_protective_stop_is_released_on_request_after_five_seconds(robot):
     assert robot.drive_to(robot.setup.home)
 
 
+def test_a_word_given_before_a_stop_is_not_for_it(robot):
+    robot.recover()
+    robot.enable()
+    drive(robot, UP, 0.2)
+    assert robot.state is DriverState.RUNNING
+    robot.controller.script.kill()
+    robot.advance(1.0)
+    assert (robot.state, robot.fault) == (DriverState.FAULT, Fault.PROGRAM_LOST)
+    assert not robot.controller.script.running
+    robot.recover()
+    robot.advance(1.0)
+    assert robot.state is DriverState.READY
+
+
 def test_an_emergency_stop_is_never_released(robot):
     robot.switch("emergency_stop")
     robot.advance(6.0)

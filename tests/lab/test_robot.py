@@ -137,6 +137,28 @@ def test_a_silent_robot_is_a_fault_and_gets_a_new_process(lab, robot, fault):
 
 
 @pytest.mark.slow
+def test_a_word_given_to_a_driver_is_not_for_the_next_one(lab, robot):
+    def lose_program():
+        drive(robot)
+        # The controller's watchdog ends the program.
+        os.kill(robot.pid, signal.SIGSTOP)
+        time.sleep(0.2)
+        os.kill(robot.pid, signal.SIGCONT)
+        assert wait_for(lambda: robot.fault is Fault.PROGRAM_LOST)
+        time.sleep(1.0)
+        assert robot.state is DriverState.FAULT
+        assert robot.fault is Fault.PROGRAM_LOST
+
+    lose_program()
+    robot.recover()
+    robot.disconnect()
+    robot.connect()
+    lose_program()
+    robot.recover()
+    robot.go_to(lab.setup.home)
+
+
+@pytest.mark.slow
 def test_a_lifted_paddle_is_held_until_somebody_lets_go(lab, robot, fault):
     drive(robot, np.zeros(2), 24)
     fault("puck_under_paddle")

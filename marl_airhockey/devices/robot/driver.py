@@ -122,6 +122,9 @@ class Driver:
         now, reading = self._clock(), self._arm.read()
         request, supervisor = self._box.request, self.supervisor
         position, before = self._position(reading), supervisor.state
+        if before is not DriverState.FAULT:
+            # An operator's word is for a stop that the operator has seen.
+            self._recovered = request.recover
         measured = Measured(
             float(position[2]),
             self._motion.measure(reading.stamp, position),

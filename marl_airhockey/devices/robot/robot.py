@@ -93,7 +93,7 @@ class Robot:
         """
         check_arm(self.config)
         memory = Mailbox.allocate()
-        self._box, self._enabled = Mailbox(memory), 0.0
+        self._box, self._enabled, self._recoveries = Mailbox(memory), 0.0, 0.0
         context = multiprocessing.get_context("spawn")
         self._process = context.Process(
             target=run_driver, args=(self.config, memory), daemon=True
