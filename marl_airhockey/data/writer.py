@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from filelock import FileLock, Timeout
 
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.recording import (
@@ -83,7 +83,7 @@ class RecordingWriter:
             self._write_meta()
         except OSError:
             self._disk.close()
-            self._lock.close()
+            self._lock.release()
             shutil.rmtree(path, ignore_errors=True)
             raise
 
@@ -111,11 +111,10 @@ class RecordingWriter:
         self, path: Path, head: dict[str, Any], rows: list[dict[str, Any]], part: int
     ) -> None:
         self.path, self._head, self._episodes = path, head, rows
-        self._lock = (path / ".lock").open("w")
+        self._lock = FileLock(path / ".lock", timeout=0)
         try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            self._lock.close()
+            self._lock.acquire()
+        except Timeout as error:
             raise RuntimeError(f"{path}: another process writes it") from error
         self._layout: dict[str, Column] = {
             name: Column.from_fields(name, fields)
@@ -229,7 +228,7 @@ class RecordingWriter:
 
     def close(self) -> None:
         """Write what waits, merge small parts, and close."""
-        if self._lock.closed:
+        if not self._lock.is_locked:
             return
         try:
             self._place_first()
@@ -239,8 +238,9 @@ class RecordingWriter:
                 merge_parts(self.path)
         finally:
             self._disk.close()
-            (self.path / ".lock").unlink(missing_ok=True)
-            self._lock.close()
+            with suppress(OSError):  # Windows deletes no open file.
+                (self.path / ".lock").unlink()
+            self._lock.release()
 
     def _place_first(self, columns: Columns | None = None) -> None:
         """Put what was there before the first step in front of it.

@@ -12,8 +12,9 @@ FIRST = -20
 def raise_priority() -> None:
     """Ask the operating system to schedule this process first.
 
-    Without the permission for it, the process keeps its priority, and a busy machine
-    may delay it.
+    Without the permission for it, and on Windows, the process keeps its priority, and a
+    busy machine may delay it.
     """
-    with contextlib.suppress(OSError):
-        os.nice(FIRST - os.nice(0))
+    if hasattr(os, "nice"):
+        with contextlib.suppress(OSError):
+            os.nice(FIRST - os.nice(0))

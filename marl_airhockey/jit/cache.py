@@ -31,11 +31,6 @@ from marl_airhockey.jit.fingerprint import fingerprint
 from marl_airhockey.jit.folders import code_folder, delete_unused
 from marl_airhockey.jit.shipped import Target, shipped
 
-try:
-    import fcntl
-except ImportError:  # Windows: a function may be compiled by several processes.
-    fcntl = None  # type: ignore[assignment]
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 used: set[Path] = set()
@@ -49,13 +44,12 @@ def one_process(name: str) -> Iterator[None]:
     Threads are kept out by numba's own lock, as a second one could be taken in another
     order. Where a lock file cannot be made, no process is kept out.
     """
+    from filelock import FileLock
+
     with global_compiler_lock, ExitStack() as stack:
-        if fcntl is not None:
-            with suppress(OSError):
-                code_folder().mkdir(parents=True, exist_ok=True)
-                path = code_folder() / f"{name}.lock"
-                file = stack.enter_context(path.open("w"))
-                fcntl.flock(file, fcntl.LOCK_EX)
+        with suppress(OSError, NotImplementedError):
+            code_folder().mkdir(parents=True, exist_ok=True)
+            stack.enter_context(FileLock(code_folder() / f"{name}.lock"))
         yield
 
 

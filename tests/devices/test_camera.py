@@ -1,5 +1,6 @@
 """Cameras: the newest frame alone, with the time at which it was taken."""
 
+import fcntl
 import socket
 import threading
 import time
@@ -160,7 +161,7 @@ def controls(monkeypatch, tmp_path):
             found[control] = value
         return v4l2.CONTROL.pack(control, found.get(control, 3))
 
-    monkeypatch.setattr(v4l2.fcntl, "ioctl", ioctl)
+    monkeypatch.setattr(fcntl, "ioctl", ioctl)
     monkeypatch.setattr(v4l2.cv2, "VideoCapture", Capture)
     device = tmp_path / "video0"
     device.touch()

@@ -6,7 +6,6 @@ switched off whatever else is set.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import struct
@@ -212,10 +211,16 @@ class CapturedSource:
             self._capture.release()
 
 
+def _ioctl(descriptor: int, request: int, data: bytes) -> bytes:
+    import fcntl  # Which Windows lacks; there no camera's controls are read.
+
+    return fcntl.ioctl(descriptor, request, data)
+
+
 def _get_control(descriptor: int, control: int) -> int | None:
     """Return the value of a control; None if the camera lacks it."""
     try:
-        packed = fcntl.ioctl(descriptor, GET_CONTROL, CONTROL.pack(control, 0))
+        packed = _ioctl(descriptor, GET_CONTROL, CONTROL.pack(control, 0))
     except OSError:
         return None
     return int(CONTROL.unpack(packed)[1])
@@ -224,7 +229,7 @@ def _get_control(descriptor: int, control: int) -> int | None:
 def _set_control(descriptor: int, control: int, value: int) -> bool:
     """Set a control; return False if the camera refuses it."""
     try:
-        fcntl.ioctl(descriptor, SET_CONTROL, CONTROL.pack(control, value))
+        _ioctl(descriptor, SET_CONTROL, CONTROL.pack(control, value))
     except OSError:
         return False
     return True
