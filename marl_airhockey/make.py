@@ -88,11 +88,10 @@ def make_vec(
         render_mode: None or "rgb_array": a picture of each world.
         **keywords: See `build.build_world`.
     """
-    from marl_airhockey.core.errors import UnknownKeywordError, unknown_keyword
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
+    from marl_airhockey.world.build import check_names
 
-    if "num_envs" in keywords:
-        raise UnknownKeywordError(unknown_keyword("num_envs", ["num_worlds"]))
+    check_names(keywords)
     modes = autoreset_mode, render_mode
     return AirHockeyVectorEnv(scenario, num_worlds, *modes, **keywords)
 

@@ -26,6 +26,22 @@ def _hints(kind: type) -> dict[str, Any]:
     return {f.name: hints[f.name] for f in fields(kind) if f.init}
 
 
+def check_count(name: str, value: Any, why: str = "") -> int:
+    """Return a count as a plain int.
+
+    Args:
+        name: Name of what is counted, for the message.
+        value: Count.
+        why: Reason for the rule, for the message.
+
+    Raises:
+        ValueError: It is not a whole number of at least 1.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise ValueError(f"{name}: {value!r} must be a whole number above 0{why}")
+    return int(value)
+
+
 def check_fields(made: Any, **ranges: Range) -> None:
     """Check the fields of a dataclass.
 

@@ -6,6 +6,11 @@ import difflib
 import importlib.util
 from collections.abc import Iterable
 
+MOST = 8
+"""Largest number of known names that a message lists"""
+LIKE = 0.6
+"""Likeness from which one name is nearly another"""
+
 
 class UnknownKeywordError(TypeError, ValueError):
     """Unknown keyword: a TypeError, as in Python, and a ValueError, as bad input is."""
@@ -30,8 +35,17 @@ def require(module: str, extra: str) -> None:
 
 
 def unknown_name(what: str, name: object, known: Iterable[object]) -> str:
-    """Return an error message: the unknown name and all known ones, closest first."""
+    """Return an error message: the unknown name and those that were meant.
+
+    Of many known names it holds the one that is nearly the same, or the closest ones.
+    """
     names = [str(n) for n in known]
     ratio = {n: difflib.SequenceMatcher(None, str(name), n).ratio() for n in names}
     ranked = sorted(names, key=lambda n: (-ratio[n], n))
-    return f"unknown {what} {name!r}; there are: {', '.join(ranked)}"
+    message = f"unknown {what} {name!r}"
+    if len(names) <= MOST:
+        return f"{message}; there are: {', '.join(ranked)}"
+    if ratio[ranked[0]] >= LIKE:
+        return f"{message} (did you mean {ranked[0]!r}?)"
+    rest = len(names) - MOST
+    return f"{message}; there are: {', '.join(ranked[:MOST])} and {rest} more"

@@ -79,7 +79,7 @@ class GlobalState:
             state.puck_edge,
             state.angle[:, first : bodies.movers] % (np.pi / 2),
             *kept,
-            np.minimum(world.episode.cycles / world.max_cycles, 1.0)[:, None],
+            np.minimum(world.episode.cycles / world.limits, 1.0)[:, None],
         )
         flat = np.concatenate(parts, -1).astype(np.float32)
         return np.clip(flat, -self._bound, self._bound)

@@ -9,13 +9,15 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.attributes import CheckedAttributes
+from marl_airhockey.envs.episode_length import SpecifiedLength
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.seats import check_one_open
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords
 
 
-class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
+class AirHockeySingleEnv(CheckedAttributes, SpecifiedLength, gymnasium.Env[Any, Array]):
     """Scenario as its only open seat sees it.
 
     Args:
@@ -38,7 +40,8 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         **keywords: Unpack[Keywords],
     ) -> None:
         self.parallel = AirHockeyEnv(scenario, render_mode, viewpoint, **keywords)
-        check_one_open(self.parallel.world)
+        self.world = self.parallel.world
+        check_one_open(self.world)
         self.agent = self.parallel.possible_agents[0]
         self.render_mode = render_mode
         self.metadata = self.parallel.metadata
@@ -57,6 +60,15 @@ class AirHockeySingleEnv(gymnasium.Env[Any, Array]):
         observation, info = self.parallel.reset(seed, options)
         super().reset(seed=seed)
         return observation[self.agent], self._named(info)
+
+    @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return self.world.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self.world.max_cycles = cycles
 
     @property
     def physics(self) -> dict[str, float]:
@@ -97,7 +109,7 @@ class AirHockeyGoalEnv(AirHockeySingleEnv):
 
     def compute_reward(self, achieved: Array, desired: Array, info: Any) -> Array:
         """(...) float32: 1 where the goal is met; of goals (..., goal) alone."""
-        scenario = self.parallel.world.scenario
+        scenario = self.world.scenario
         assert isinstance(scenario, GoalScenario)
         return np.asarray(scenario.shown_reward(achieved, desired), np.float32)
 

@@ -6,11 +6,15 @@ from collections.abc import Sequence
 from typing import Any, Unpack
 
 import numpy as np
+from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.checks import check_count
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.attributes import CheckedAttributes
+from marl_airhockey.envs.episode_length import SpecifiedLength
 from marl_airhockey.envs.infos import infos_of
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.pictures import Pictures
@@ -23,7 +27,9 @@ from marl_airhockey.world.observer import Observation
 from marl_airhockey.world.step_result import StepResult
 
 
-class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
+class AirHockeyVectorEnv(
+    CheckedAttributes, SpecifiedLength, VectorEnv[Any, Any, Array]
+):
     """B worlds with one open seat as a gymnasium ``VectorEnv``.
 
     ``infos`` are flat dicts of arrays (B, ...), with the same keys at reset and step;
@@ -80,6 +86,15 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
         return self.world.observer.labels
 
     @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return self.world.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self.world.max_cycles = cycles
+
+    @property
     def physics(self) -> dict[str, Array]:
         """Physical parameters of the episodes by name, (B,); copies."""
         physics = self.world.episode.physics
@@ -108,6 +123,9 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
             return self._reset_some(np.asarray(mask), seed), self._infos()
         self._ended[:] = False
         observation = _rows(reset_world(self.world, seed, given))
+        if seed is not None:
+            first = int(self.world.seeds[0])
+            self._np_random, self._np_random_seed = np_random(first)
         self._pictures.follow(range(self.num_envs))
         return observation, self._infos()
 
@@ -196,6 +214,28 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Array]):
     def close_extras(self, **kwargs: Any) -> None:
         """Close the physics."""
         self.world.close()
+
+
+def make_vector(
+    scenario: str | Scenario,
+    num_envs: int = 1,
+    max_episode_steps: int | None = None,
+    **given: Any,
+) -> AirHockeyVectorEnv:
+    """Build the environment, as ``gymnasium.make_vec`` asks for it.
+
+    Args:
+        scenario: Name of the scenario, or a scenario object.
+        num_envs: Number of worlds, B.
+        max_episode_steps: Length after which an episode ends at the latest, in control
+            steps; None or -1 for its own.
+        **given: Other arguments of `AirHockeyVectorEnv`.
+    """
+    envs = AirHockeyVectorEnv(scenario, num_envs, **given)
+    if max_episode_steps is not None and max_episode_steps != -1:
+        shortened = check_count("max_episode_steps", max_episode_steps)
+        envs.max_cycles = min(shortened, envs.max_cycles)
+    return envs
 
 
 def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:

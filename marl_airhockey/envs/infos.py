@@ -70,6 +70,8 @@ def infos_of(result: StepResult, world: World, alive: Array) -> dict[str, Array]
     return {
         "applied_action": result.applied_action[:, 0],
         "success": result.success[:, 0],
+        # The name under which stable-baselines3 looks for it.
+        "is_success": result.success[:, 0],
         "first_shot": result.first_shot,
         "alive": alive,
         "cost": result.cost[:, 0],

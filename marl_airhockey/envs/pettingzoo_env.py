@@ -10,7 +10,9 @@ import numpy as np
 from pettingzoo import ParallelEnv
 
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.attributes import CheckedAttributes
 from marl_airhockey.envs.global_state import GlobalState
 from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
@@ -32,7 +34,7 @@ WINDOW = importlib.util.find_spec("pygame") is not None
 """True if there is what a window needs: the extra "play"."""
 
 
-class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+class AirHockeyEnv(CheckedAttributes, ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """World of a scenario whose open seats are the agents, ``paddle_0`` and so on.
 
     All agents stay to the end of the episode and end together. The info of an agent
@@ -117,17 +119,24 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
         }
         return {name: agents for name, agents in mine.items() if agents}
 
+    def _check_agent(self, agent: str) -> None:
+        """Raise a KeyError for what is no agent."""
+        if agent not in self._action_spaces:
+            raise KeyError(unknown_name("agent", agent, self.possible_agents))
+
     def observation_space(self, agent: str) -> Any:
         """Return the same object at every call."""
+        self._check_agent(agent)
         return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> Any:
         """Return the same object at every call."""
+        self._check_agent(agent)
         return self._action_spaces[agent]
 
     def observation_labels(self, agent: str) -> tuple[str, ...]:
         """Return the name of each element of the (flat part of the) observation."""
-        self._observation_spaces[agent]
+        self._check_agent(agent)
         return self.world.observer.labels
 
     @property
@@ -225,6 +234,11 @@ class AirHockeyEnv(ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     def _array(self, actions: Mapping[str, Any]) -> Array:
         """Return (1, open, 2) from a dict with an action for each agent and no more."""
         agents = self.agents
+        if not isinstance(actions, Mapping):
+            raise ValueError(
+                f"actions: expected a dict with an action for each of {agents}, got "
+                f"{type(actions).__name__}"
+            )
         if actions.keys() != self._action_spaces.keys():
             missing = sorted(set(agents) - set(actions))
             extra = sorted(set(actions) - set(agents))

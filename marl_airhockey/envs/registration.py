@@ -13,11 +13,15 @@ from marl_airhockey.discovery import gymnasium_id, names_in
 
 
 def register_all() -> None:
-    """Register ``marl_airhockey/CamelCase-v0`` for every file in ``scenarios/``."""
+    """Register ``marl_airhockey/CamelCase-v0`` for every file in ``scenarios/``.
+
+    Without a length: ``gymnasium.make`` would end episodes there that keywords make
+    longer. The environments fill in their own, see `episode_length`.
+    """
     for name in names_in("scenarios"):
         register(
             id=gymnasium_id(name),
             entry_point="marl_airhockey.envs.gymnasium_env:make_single",
-            vector_entry_point="marl_airhockey.envs.gymnasium_vec_env:AirHockeyVectorEnv",
+            vector_entry_point="marl_airhockey.envs.gymnasium_vec_env:make_vector",
             kwargs={"scenario": name},
         )

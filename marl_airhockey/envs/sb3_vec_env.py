@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
 from marl_airhockey.contracts.scenario import GoalScenario
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.pictures import Pictures
+from marl_airhockey.envs.slot import Slot
 from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.types import Array, Memory
 
 
 class AirHockeyVecEnv(VecEnv):
     """Slots as an environment of stable-baselines3, see `SlotEnv`.
+
+    It does what a ``DummyVecEnv`` of as many single environments does, each in a
+    ``Monitor``. `get_attr`, `set_attr` and `env_method` reach what `Slot` has.
 
     Args:
         slots: Worlds and their slots.
@@ -26,11 +33,16 @@ class AirHockeyVecEnv(VecEnv):
     def __init__(self, slots: SlotEnv, render_mode: str | None = None) -> None:
         self.slots, self.world = slots, slots.world
         self.render_mode = render_mode
-        self._pictures = Pictures(self.world, render_mode)
+        metadata: dict[str, Any] = {
+            **AirHockeyEnv.metadata,
+            "render_modes": ["rgb_array"],
+            "render_fps": round(1 / self.world.control_dt),
+        }
+        self.metadata, self._pictures = metadata, Pictures(self.world, render_mode)
         self._actions = np.zeros((slots.num_envs, 2))
+        self._slots: dict[int, Slot] = {}
         super().__init__(slots.num_envs, slots.observation_space, slots.action_space)
-        fps: Any = round(1 / self.world.control_dt)
-        self.metadata["render_fps"] = fps
+        self.metadata = metadata
 
     @property
     def observation_labels(self) -> tuple[str, ...]:
@@ -38,16 +50,52 @@ class AirHockeyVecEnv(VecEnv):
         return self.world.observer.labels
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Give world i the seed + i at the next reset."""
-        if seed is not None:
-            self.slots.seed(seed)
-        return [seed] * self.num_envs
+        """Give world i the seed + i at the next reset; return the slots' seeds.
+
+        Args:
+            seed: Seed of the first world; None draws one from numpy's global generator.
+        """
+        first = super().seed(seed)[0]
+        assert first is not None
+        self._seeds = [first + self.slots.world_of(i) for i in range(self.num_envs)]
+        return self._seeds
 
     def reset(self) -> Any:
-        """Begin an episode in every world."""
-        observation = self.slots.reset()
+        """Begin an episode in every world, with the seeds and options that are set.
+
+        Raises:
+            ValueError: Slots of one world have different options; or a bad option, see
+                `AirHockeyEnv.reset`.
+        """
+        given = self._seeds[0] is not None
+        seeds = [s for s in self._of_worlds(self._seeds) if s is not None]
+        options = self._of_worlds(self._options)
+        self._reset_seeds()
+        self._reset_options()
+        observation = self.slots.reset(seeds if given else None, options)
         self._pictures.follow(range(self.world.num_worlds))
         return observation
+
+    def _of_worlds(self, every: Sequence[Any]) -> list[Any]:
+        """Return what each world is given, of what each slot is given."""
+        if len(every) != self.num_envs:
+            raise ValueError(f"options: {len(every)} for {self.num_envs} slots")
+        worlds: dict[int, Any] = {}
+        for i, given in enumerate(every):
+            first = worlds.setdefault(self.slots.world_of(i), given)
+            if first is not given and repr(first) != repr(given):
+                raise ValueError("options: slots of one world need the same ones")
+        return [worlds[world] for world in range(self.world.num_worlds)]
+
+    def set_options(
+        self, options: Sequence[Mapping[str, Any]] | Mapping[str, Any] | None = None
+    ) -> None:
+        """Set options of the next reset, one for all slots or a list with one for each.
+
+        Args:
+            options: See `AirHockeyEnv.reset`.
+        """
+        super().set_options(options)  # type: ignore[arg-type]
 
     def get_state(self) -> tuple[State, Memory]:
         """Return the true states and the memories of all worlds, (B, ...)."""
@@ -76,28 +124,40 @@ class AirHockeyVecEnv(VecEnv):
         return np.asarray(scenario.shown_reward(achieved, desired), np.float32)
 
     def get_images(self) -> Sequence[Array | None]:
-        """Return a picture (H, W, 3) uint8 of each world."""
-        return self._pictures.take()
+        """Return a picture (H, W, 3) uint8 of the world of each slot; or None each."""
+        if self.render_mode is None:
+            warnings.warn(
+                'The render mode is None; build with "rgb_array"', stacklevel=2
+            )
+            return [None] * self.num_envs
+        pictures = self._pictures.take()
+        return [pictures[self.slots.world_of(i)] for i in range(self.num_envs)]
 
     def close(self) -> None:
         """Close the physics."""
         self.slots.close()
 
+    def _chosen(self, indices: Any) -> list[Slot]:
+        every = range(self.num_envs)
+        chosen = [every[i] for i in self._get_indices(indices)]
+        return [self._slots.setdefault(i, Slot(self, i)) for i in chosen]
+
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of the environment, once for each slot."""
-        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+        """Return an attribute of some slots."""
+        return [getattr(slot, attr_name) for slot in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of the environment."""
-        setattr(self, attr_name, value)
+        """Set an attribute of some slots, see `attributes.CheckedAttributes`."""
+        for slot in self._chosen(indices):
+            setattr(slot, attr_name, value)
 
     def env_method(
         self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any
     ) -> list[Any]:
-        """Call a method once for each of some slots."""
-        method = getattr(self, method_name)
-        return [method(*args, **kwargs) for _ in self._get_indices(indices)]
+        """Call a method of some slots."""
+        chosen = self._chosen(indices)
+        return [getattr(slot, method_name)(*args, **kwargs) for slot in chosen]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return False for each slot: none is wrapped."""
-        return [False for _ in self._get_indices(indices)]
+        """Return True for ``Monitor``, whose ``episode`` all infos have; else False."""
+        return [wrapper_class is Monitor for _ in self._get_indices(indices)]

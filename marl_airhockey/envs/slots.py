@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Unpack
 
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.state import State
+from marl_airhockey.envs.reset_options import reset_each
 from marl_airhockey.envs.seats import check_some_open
 from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
@@ -23,8 +24,8 @@ class SlotEnv:
 
     It has what learners need and depends on no learning library; `AirHockeyVecEnv` is
     the same for stable-baselines3. Episodes restart immediately. Slots whose episode
-    ended get ``terminal_observation``, ``TimeLimit.truncated``, ``is_success``,
-    ``first_shot`` and ``episode`` in their infos; all others share one empty dict.
+    ended get ``terminal_observation``, ``is_success``, ``first_shot`` and ``episode``
+    in their infos; ``TimeLimit.truncated`` is in all. Each info is a dict of its own.
 
     Args:
         scenario: Name of the scenario, or a scenario object.
@@ -55,7 +56,6 @@ class SlotEnv:
         self.ended = np.zeros(0, np.int64)
         """Indices of the worlds that restarted in the last step."""
         self._began = time.time()
-        self._nothing: dict[str, Any] = {}
         self._returns = np.zeros(self.num_envs)
         self._lengths = np.zeros(self.num_envs, np.int64)
 
@@ -68,10 +68,21 @@ class SlotEnv:
         """Give world i the seed + i at the next reset."""
         self.world.seed(seed)
 
-    def reset(self) -> Any:
-        """Begin an episode in every world; return the observations (slots, ...)."""
+    def reset(
+        self,
+        seed: Sequence[int] | None = None,
+        options: Sequence[Mapping[str, Any]] = (),
+    ) -> Any:
+        """Begin an episode in every world; return the observations (slots, ...).
+
+        Args:
+            seed: Seed of each world; None continues with those there are.
+            options: Options of each world, see `reset_options.reset_world`.
+        """
         self._returns[:], self._lengths[:] = 0.0, 0
-        return self.of_slots(self.world.reset())
+        observation = reset_each(self.world, seed, options)
+        self._all_began()
+        return self.of_slots(observation)
 
     def set_state(
         self, state: State, memory: Memory | None = None, worlds: Array | None = None
@@ -108,7 +119,7 @@ class SlotEnv:
             penalty = self.penalty(self._pick(every), excess, done)
             reward -= penalty.astype(np.float32)
             self.last_terms["action_penalty"] = -float(penalty.mean())
-        infos = [self._nothing] * self.num_envs
+        infos = [{"TimeLimit.truncated": False} for _ in range(self.num_envs)]
         self.ended = np.flatnonzero(ended)
         if result.final_observation is not None:
             self._fill_infos(infos, np.flatnonzero(done), result)
@@ -124,10 +135,11 @@ class SlotEnv:
         final = self.of_slots(result.final_observation)
         success = self._pick(result.success)
         for i in slots.tolist():
-            world = self._world(i)
+            world = self.world_of(i)
+            cut = bool(result.truncated[world] and not result.terminated[world])
             infos[i] = {
                 "terminal_observation": _row(final, i),
-                "TimeLimit.truncated": bool(result.truncated[world]),
+                "TimeLimit.truncated": cut,
                 "is_success": bool(success[i]),
                 "first_shot": bool(result.first_shot[world]),
                 "episode": {
@@ -155,9 +167,13 @@ class SlotEnv:
         """Return (slots,) of (B,)."""
         return np.repeat(ended, self.seats)
 
-    def _world(self, slot: int) -> int:
+    def world_of(self, slot: int) -> int:
         """Return the index of a slot's world."""
         return slot // self.seats
+
+    def _all_began(self) -> None:
+        """Take note that an episode begins in every world."""
+        return None
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:
         """Take note that some worlds, by index, restarted after their last step."""

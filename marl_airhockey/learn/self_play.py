@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -158,15 +157,11 @@ class SelfPlayEnv(SlotEnv):
     def _done(self, ended: Array) -> Array:
         return np.asarray(ended[self._rows])
 
-    def _world(self, slot: int) -> int:
+    def world_of(self, slot: int) -> int:
         return int(self._rows[slot])
 
-    def reset(self) -> Any:
-        """Begin an episode in every world; return the observations (slots, ...)."""
-        self._returns[:], self._lengths[:] = 0.0, 0
-        observation = self.world.reset()
+    def _all_began(self) -> None:
         self._begin(np.arange(self.world.num_worlds))
-        return self.of_slots(observation)
 
     def _of_worlds(self, actions: Array) -> Array:
         """Return the actions of all seats: the learner's, and those of opponents."""

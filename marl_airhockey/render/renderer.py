@@ -81,7 +81,7 @@ class Renderer:
             trails=self._trails,
             title=self.title,
             note=note,
-            clock=episode.cycles[i] / world.max_cycles,
+            clock=episode.cycles[i] / world.limits[i],
             success=bool(episode.success[i].any()),
             eliminated=() if eliminated is None else eliminated.tolist(),
         )

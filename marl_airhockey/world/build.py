@@ -10,6 +10,7 @@ import numpy as np
 from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.checks import check_count
 from marl_airhockey.core.errors import (
     UnknownKeywordError,
     unknown_keyword,
@@ -30,6 +31,14 @@ LONGEST_STEP = 0.2
 paddle has time to come to where a puck has crossed a goal line."""
 
 
+OTHER_NAMES = {
+    **dict.fromkeys(("num_envs", "n_envs", "batch_size"), "num_worlds"),
+    **dict.fromkeys(("max_episode_steps", "max_steps", "horizon"), "max_cycles"),
+    **dict.fromkeys(("camera", "camera_name"), "viewpoint"),
+}
+"""Names of keywords in other libraries, with ours"""
+
+
 class Keywords(TypedDict, total=False):
     """Keywords of every environment; see `build_world` for meanings."""
 
@@ -45,6 +54,25 @@ class Keywords(TypedDict, total=False):
     max_cycles: int
     options: Mapping[str, Any]
     rig: str
+
+
+def check_names(keywords: Mapping[str, Any]) -> None:
+    """Refuse keywords that no environment has.
+
+    Raises:
+        UnknownKeywordError: One of these, with the one that was meant.
+    """
+    for name in keywords:
+        if name in OTHER_NAMES:
+            raise UnknownKeywordError(
+                f"unexpected keyword argument {name!r}; here it is "
+                f"{OTHER_NAMES[name]!r}"
+            )
+        if name not in Keywords.__annotations__:
+            raise UnknownKeywordError(
+                unknown_keyword(name, Keywords.__annotations__)
+                + "; fields of the scenario go into options={...}"
+            )
 
 
 def build_world(
@@ -88,19 +116,13 @@ def build_world(
         ValueError: An unknown name or a value that makes no sense, named.
         RuntimeError: A backend that cannot run here, with the fix.
     """
-    for name in keywords:
-        if name not in Keywords.__annotations__:
-            raise UnknownKeywordError(
-                unknown_keyword(name, Keywords.__annotations__)
-                + "; fields of the scenario go into options={...}"
-            )
+    check_names(keywords)
     keywords = table_keywords(keywords)
     threads()  # Refused here if it makes no sense, not at the first step.
-    if num_worlds < 1:
-        raise ValueError(f"num_worlds: {num_worlds} must be at least 1")
+    num_worlds = check_count("num_worlds", num_worlds)
     game = scenario_of(scenario, keywords)
     profile, max_cycles = keywords.get("profile", "ideal"), keywords.get("max_cycles")
-    backend = _backend(game, num_worlds, keywords, max_cycles)
+    backend = _backend(game, num_worlds, keywords)
     physics = _physics(game, backend, keywords, real=backend.senses_itself)
     drivers = _drivers(game, backend, keywords)
     if backend.senses_itself:
@@ -172,9 +194,7 @@ def table_keywords(keywords: Keywords) -> Keywords:
     return {**keywords, "profile": used, "options": options}
 
 
-def _backend(
-    game: Scenario, num_worlds: int, keywords: Keywords, max_cycles: int | None
-) -> Backend:
+def _backend(game: Scenario, num_worlds: int, keywords: Keywords) -> Backend:
     """Return the backend that keywords name, for the scene of a scenario."""
     name = keywords.get("backend", DEFAULT_BACKEND)
     kind = find_backend(name)
@@ -182,7 +202,7 @@ def _backend(
     if reason:
         raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
     control_dt, substeps = keywords.get("control_dt", 0.05), keywords.get("substeps")
-    _check_times(control_dt, substeps, max_cycles)
+    _check_times(control_dt, substeps)
     return kind(game.scene, num_worlds, control_dt, substeps)
 
 
@@ -235,22 +255,15 @@ def compile_world(scenario: str | Scenario, keywords: Keywords) -> None:
         world.close()
 
 
-def _check_times(
-    control_dt: float, substeps: int | None, max_cycles: int | None
-) -> None:
+def _check_times(control_dt: float, substeps: int | None) -> None:
     if not 0.001 <= control_dt <= LONGEST_STEP:
         raise ValueError(
             f"control_dt: {control_dt} s must be in 0.001 .. {LONGEST_STEP}; in longer "
             "steps a paddle overlaps a puck that has scored"
         )
-    whole = isinstance(substeps, int) and not isinstance(substeps, bool)
-    if substeps is not None and not (whole and substeps >= 1):
-        raise ValueError(
-            f"substeps: {substeps!r} must be a whole number above 0: control_dt is a "
-            "multiple of the simulation's step"
-        )
-    if max_cycles is not None and max_cycles < 1:
-        raise ValueError(f"max_cycles: {max_cycles} must be at least 1")
+    if substeps is not None:
+        why = ": control_dt is a multiple of the simulation's step"
+        check_count("substeps", substeps, why)
 
 
 def scenario_of(scenario: str | Scenario, keywords: Keywords) -> Scenario:

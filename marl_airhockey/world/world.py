@@ -22,6 +22,7 @@ import numpy as np
 from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.checks import check_count
 from marl_airhockey.core.parameters import SCATTER
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.rng import RandomStreams, StreamSet, seeds_of
@@ -76,7 +77,8 @@ class World:
         self.num_worlds = b = backend.num_worlds
         self.control_dt = dt = backend.control_dt
         self.autoreset, seats = autoreset, range(len(scene.seats))
-        self._limit = np.full(b, max_cycles or round(scenario.seconds / dt))
+        cycles = round(scenario.seconds / dt) if max_cycles is None else max_cycles
+        self._limit = np.full(b, check_count("max_cycles", cycles))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = ReachPlanes.of(scene.table, scene.seats)
         sight = backend.sight if backend.senses_itself else None
@@ -175,7 +177,26 @@ class World:
 
     @max_cycles.setter
     def max_cycles(self, cycles: int) -> None:
-        self._limit[:] = cycles
+        self.limit_cycles(cycles)
+
+    @property
+    def limits(self) -> Array:
+        """(B,) length of an episode in control steps; a copy."""
+        return self._limit.copy()
+
+    def limit_cycles(self, cycles: int, worlds: Array | None = None) -> None:
+        """Set the length of an episode, from the one that is running on.
+
+        Args:
+            cycles: Control steps.
+            worlds: (W,) indices; None for all.
+
+        Raises:
+            ValueError: Not a whole number of at least 1.
+        """
+        self._limit[slice(None) if worlds is None else worlds] = check_count(
+            "max_cycles", cycles
+        )
 
     @property
     def outcome(self) -> dict[str, Array]:
@@ -307,7 +328,7 @@ class World:
             raise RuntimeError("set_state: call reset() first, which draws the physics")
         worlds = checked_worlds(worlds, self.num_worlds)
         rows = settled(state, self.scene, len(worlds))
-        longest = self.max_cycles * self.control_dt
+        longest = float(self._limit[worlds].min()) * self.control_dt
         if memory is None:
             rng = self._streams.of("start", worlds)
             memory = self.scenario.initial_memory(rows, rng)

@@ -88,7 +88,7 @@ BROKEN = [
     ("limits.speed", 0, "limits.speed: 0; expected"),
     ("limits.speed", True, "limits.speed: True"),
     ("limits.sped", 0.1, "limits: unknown field 'sped'; there are: speed"),
-    ("payloads", 0.1, "unknown field 'payloads'; there are: payload"),
+    ("payloads", 0.1, "unknown field 'payloads' .did you mean 'payload'"),
     ("payload", "0.6", "payload: '0.6'; expected a finite number from 0 to 5"),
     ("payload", 60.0, "payload: 60.0"),
     ("pendant.speed", float("nan"), "pendant.speed: nan"),

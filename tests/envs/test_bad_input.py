@@ -25,18 +25,21 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
     [
         (
             lambda: ah.parallel_env("jugle"),
-            "unknown scenario 'jugle'; there are: juggle,",
+            "unknown scenario 'jugle' (did you mean 'juggle'",
         ),
         (lambda: ah.parallel_env("juggle", backend="pymonk"), "there are: pymunk"),
         (
             lambda: ah.parallel_env("juggle", drivers={"paddle_0": "strker"}),
-            "unknown driver 'strker'; there are: striker",
+            "unknown driver 'strker' (did you mean 'striker'",
         ),
         (
             lambda: ah.parallel_env("juggle", drivers={"paddle_7": "still"}),
             "'paddle_7'",
         ),
-        (lambda: ah.parallel_env("juggle", options={"lifft": 1}), "there are: lift"),
+        (
+            lambda: ah.parallel_env("juggle", options={"lifft": 1}),
+            "did you mean 'lift'",
+        ),
         (
             lambda: ah.parallel_env("duel", drivers={"paddle_0": "striker:back=abc"}),
             "option 'back' of striker: expected a number, got 'abc'",
@@ -74,13 +77,19 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
         (lambda: ah.parallel_env("juggle").reset(seed="abc"), "seed: 'abc' is no"),
         (lambda: ah.gym_env("juggle").reset(seed="abc"), "seed: 'abc' is no whole"),
         (lambda: ah.league("duel", ["still", "random"], games=3), "an even number"),
-        (lambda: ah.parallel_env("juggle", observ="velocity"), "there are: observe"),
+        (
+            lambda: ah.parallel_env("juggle", observ="velocity"),
+            "did you mean 'observe'",
+        ),
         (lambda: ah.parallel_env("juggle", observe="speed"), "unknown observe 'speed'"),
         (lambda: ah.parallel_env("juggle", profile="real"), "unknown profile 'real'"),
         (lambda: ah.parallel_env("juggle", seats="arcad"), "there are: arcade"),
         (lambda: ah.parallel_env("juggle", options={"table": "big"}), "unknown table"),
         (lambda: ah.parallel_env("juggle", render_mode="ansi"), "render_mode 'ansi'"),
-        (lambda: ah.parallel_env("juggle", physics={"tlt": 1.0}), "there are: tilt"),
+        (
+            lambda: ah.parallel_env("juggle", physics={"tlt": 1.0}),
+            "did you mean 'tilt'",
+        ),
         (lambda: ah.parallel_env("juggle", physics={"tilt": -90.0}), "'tilt'"),
         (lambda: ah.parallel_env("juggle", physics={"tilt": (5.0, 2.0)}), "'tilt'"),
         (lambda: ah.parallel_env("juggle", physics={"tilt": "steep"}), "'tilt'"),
@@ -93,7 +102,15 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
         (lambda: ah.parallel_env("reach", options={"radius": (0.1, 0.2)}), "a range"),
         (lambda: ah.parallel_env("reach", options={"radius": "wide"}), "radius"),
         (lambda: ah.parallel_env("juggle", options={"pucks": 0}), "pucks"),
-        (lambda: ah.make_vec("juggle", 0), "num_worlds"),
+        (lambda: ah.make_vec("juggle", 0), "num_worlds: 0 must be a whole number"),
+        (lambda: ah.make_vec("juggle", "64"), "num_worlds: '64' must be a whole"),
+        (lambda: ah.make_sb3_vec("juggle", 2.5), "num_worlds: 2.5 must be a whole"),
+        (lambda: ah.make_world("juggle", True), "num_worlds: True must be a whole"),
+        (lambda: ah.make_vec("juggle", num_envs=4), "here it is 'num_worlds'"),
+        (lambda: ah.make_sb3_vec("juggle", n_envs=4), "here it is 'num_worlds'"),
+        (lambda: ah.make_world("juggle", num_envs=4), "here it is 'num_worlds'"),
+        (lambda: ah.gym_env("juggle", max_steps=4), "here it is 'max_cycles'"),
+        (lambda: ah.gym_env("juggle", camera="top"), "here it is 'viewpoint'"),
         (lambda: Table.rectangle(-1.0, 0.6), "vertices"),
         (lambda: Table(CORNERS, puck_radius=0.4), "puck_radius"),
         (
@@ -137,6 +154,8 @@ def test_every_parameter_takes_a_value_and_a_range(name):
     [
         ({}, "missing agents .*paddle_0"),
         ({**GOOD, "paddle_1": np.zeros(2)}, "extra .*paddle_1"),
+        (np.zeros(2), r"expected a dict with an action for each of \['paddle_0'\]"),
+        ([0.1, 0.2], "actions: expected a dict .* got list"),
         ({"paddle_0": np.zeros(3)}, "paddle_0.*shape"),
         ({"paddle_0": "fast"}, "paddle_0"),
         ({"paddle_0": np.array([True, False])}, "dtype bool"),
@@ -183,6 +202,13 @@ def test_a_scene_that_a_backend_cannot_play_is_refused_with_the_reason(backend):
 
     with pytest.raises(ValueError, match="slide into a goal;"):
         ah.parallel_env(BlocksAndMouths(), backend=backend)
+
+
+def test_an_unknown_agent_is_named():
+    env = ah.parallel_env("duel")
+    for read in env.observation_space, env.action_space, env.observation_labels:
+        with pytest.raises(KeyError, match="unknown agent 'paddle_9'; there are: pad"):
+            read("paddle_9")
 
 
 def test_a_world_wants_its_shape():

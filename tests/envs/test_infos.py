@@ -57,7 +57,7 @@ def test_who_lost_all_lives_is_not_alive():
 def test_batches_tell_the_same_as_single_worlds():
     many, one = ah.make_vec("reach", 3), gymnasium.make("marl_airhockey/Reach-v1")
     _, first = many.reset(seed=5)
-    assert first.keys() == one.reset(seed=5)[1].keys() - {"is_success"}
+    assert first.keys() == one.reset(seed=5)[1].keys()
     actions = np.random.default_rng(0).uniform(-1, 1, (20, 3, 2)).astype(np.float32)
     for action in actions:
         *_, infos = many.step(action)
@@ -124,7 +124,7 @@ def test_an_unknown_keyword_is_an_error_in_the_words_of_python():
     for kind in (TypeError, ValueError):
         with pytest.raises(kind, match="unexpected keyword argument 'frameskip'"):
             gymnasium.make("marl_airhockey/Juggle-v0", frameskip=4)
-    with pytest.raises(ValueError, match=r"'max_cycle'.* max_cycles"):
+    with pytest.raises(ValueError, match="did you mean 'max_cycles'"):
         ah.parallel_env("juggle", max_cycle=4)
     with pytest.raises(ValueError, match="autoreset_mode: 'never'"):
         ah.make_vec("juggle", autoreset_mode="never")

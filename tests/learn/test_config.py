@@ -10,7 +10,7 @@ def test_presets_are_whole_and_bad_settings_are_named(scenario):
     config = preset(scenario, {"seed": 3})
     assert config.total_steps > 0
     assert config.seed == 3
-    with pytest.raises(ValueError, match="there are: gamma"):
+    with pytest.raises(ValueError, match="did you mean 'gamma'"):
         preset(scenario, {"gama": 0.9})
     with pytest.raises(ValueError, match="num_worlds"):
         preset(scenario, {"num_worlds": 0})

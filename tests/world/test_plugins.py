@@ -87,7 +87,7 @@ def test_a_class_or_an_object_is_a_scenario():
         ("broken.py", "cannot be imported: ModuleNotFoundError"),
         ("empty.py", "expected one class below Driver, found none"),
         ("my_driver.py:Pull", "has no 'Pull'"),
-        ("stricker:weak", "unknown driver 'stricker:weak'; there are: striker"),
+        ("stricker:weak", "unknown driver 'stricker:weak' .did you mean 'striker'"),
         ("json:dumps", "dumps is no player of this environment"),
     ],
 )

@@ -1,0 +1,50 @@
+"""Attributes of environments that are built: which ones can still be set."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from difflib import get_close_matches
+from typing import Any
+
+from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.world import World
+
+SETTABLE = "max_cycles"
+"""Keyword that is an attribute, too, which can be set at any time"""
+LIKE = 0.8
+"""Likeness from which a name counts as misspelt"""
+
+
+class CheckedAttributes:
+    """Mixin that refuses to set what only building an environment can set.
+
+    Other names are stored, as learning libraries store some of their own.
+    """
+
+    world: World
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        world = self.__dict__.get("world")
+        known = name in self.__dict__ or hasattr(type(self), name)
+        if world is not None and not (known or name.startswith("_")):
+            refuse_built(world, name)
+        super().__setattr__(name, value)
+
+
+def refuse_built(world: World, name: str) -> None:
+    """Refuse the name of a keyword or of an option, and one that is nearly that.
+
+    Raises:
+        AttributeError: The name is one of these; the message says what to do.
+    """
+    options = [field.name for field in fields(world.scenario)]
+    names = [*Keywords.__annotations__, *options]
+    if name in names:
+        given = f"{name}=..." if name not in options else f'options={{"{name}": ...}}'
+        raise AttributeError(
+            f"{name!r} cannot be set on an environment that is built; build one with "
+            f"{given}"
+        )
+    near = get_close_matches(name, names, 1, LIKE)
+    if near:
+        raise AttributeError(f"unknown attribute {name!r}; did you mean {near[0]!r}?")
