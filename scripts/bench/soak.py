@@ -43,6 +43,8 @@ OPERATOR = 6.0
 """Time after which an operator recovers from a FAULT, s"""
 MOST_AWAY = 0.3
 """Distance from home at which an arm was carried away, m"""
+AT_TABLE = 0.04
+"""Distance from the reach up to which a driver takes an arm as it is, m"""
 
 
 class Soak:
@@ -58,6 +60,7 @@ class Soak:
         self.normals, self.offsets = half_planes(self.robot.setup.seat.reach)
         self.top, self.outside, self.depth, self.longest = 0.0, -np.inf, 0.0, 0.0
         self.leaps = self.cycles = self.faults = 0
+        self._left_at = 0.0
         self.changes: Counter[str] = Counter()
         self._state = (self.robot.state, self.robot.fault)
         self._fault, self._until, self._next = "", 0.0, 5.0
@@ -129,9 +132,16 @@ class Soak:
         self.leaps += speed > LEAP * self.limit
         place = robot.true_position
         if robot.state is not DriverState.FAULT:
-            outside = -float((self.normals @ place[:2] + self.offsets).min())
-            self.outside = max(self.outside, outside)
+            # A person may have left the arm outside; then it only has to come in.
+            outside = max(self._outside(), 0.0)
+            self._left_at = min(self._left_at, outside)
+            self.outside = max(self.outside, outside - self._left_at)
             self.depth = max(self.depth, -float(place[2]))
+
+    def _outside(self) -> float:
+        """Return how far the paddle is outside its reach, m."""
+        place = self.robot.true_position[:2]
+        return -float((self.normals @ place + self.offsets).min())
 
     def _operate(self) -> None:
         """Do what an operator does: let go of latched HOLDs, recover from FAULTs."""
@@ -154,13 +164,15 @@ class Soak:
         else:
             robot.recover()
             robot.advance(0.5)
+        self._left_at = max(self._outside(), 0.0)
         robot.enable()
 
     def _guide_back(self) -> None:
         """Lead an arm home that was carried away, as a person does."""
         robot, home = self.robot, np.asarray(self.robot.setup.home)
         arm = robot.controller.arm
-        if np.linalg.norm(robot.true_position[:2] - home) > MOST_AWAY:
+        away = np.linalg.norm(robot.true_position[:2] - home) > MOST_AWAY
+        if away or self._outside() > AT_TABLE or robot.fault is Fault.NOT_AT_TABLE:
             arm.motion = Line(robot.setup.mounting.pose(home, 0.01), 0.25, 1.0)
             robot.advance(5.0)
 

@@ -93,11 +93,12 @@ class ServoSettings:
     """Force with which the paddle is pressed on the table, N"""
     compliance: float = 0.15
     """Largest speed of the compliant axis, m/s"""
-    deviation: float = 0.085
-    """Largest gap between the sent and the measured position, as the time in which the
-    paddle covers it at its speed limit, s. The emulated arm needs 0.067 s. An arm that
-    closes a gap of 0.087 s reaches the speed limit, so it would leap from a larger
-    one."""
+    lag: float = 0.068
+    """Time by which an arm usually follows what it is sent, s"""
+    deviation: float = 0.026
+    """Largest distance of an arm from where it usually is by now, as the time in which
+    the paddle covers it at its speed limit, s. From half of it on, poses are sent
+    slower. The emulated arm needs 0.013 s."""
 
     def __post_init__(self) -> None:
         # The first two: what the controller takes.
@@ -107,6 +108,7 @@ class ServoSettings:
             gain=(100, 2000),
             force=(0, 50),
             compliance=(0.001, 2),
+            lag=(0.001, 5),
             deviation=(0.001, 5),
         )
 

@@ -72,7 +72,7 @@ class Driver:
         self._due, reading = clock(), arm.read()
         position = self._position(reading)
         self._motion = Motion(config, self._dt, position)
-        self.supervisor = Supervisor(self._due, reading.stamp, self._motion.most)
+        self.supervisor = Supervisor(self._due, reading.stamp, self._motion.latest)
         self._track = np.zeros((TRACK, 3))
         self._track[:] = self._due, *position[:2]
         if not self._at_table(reading):

@@ -43,6 +43,8 @@ OFF_TABLE = 0.02
 """Distance from the table's plane at which a paddle that was on it has left it, m"""
 PRESSED = 1.0
 """Time for which a paddle may take to come down on the table after it was pressed, s"""
+LATE, LATE_TIME = 0.7, 0.2
+"""Share of the largest deviation that an arm may have for this time, s"""
 LATCHED = (Fault.PADDLE_LIFTED, Fault.PADDLE_BELOW_TABLE, Fault.DEVIATION)
 """Reasons of a HOLD that ends only when the caller disables the driver"""
 log = logging.getLogger("marl_airhockey.robot")
@@ -54,7 +56,7 @@ class Measured(NamedTuple):
     height: float
     """Height of the paddle above the table's plane, m"""
     deviation: float
-    """Distance of the paddle from where it was sent, m"""
+    """Distance of the paddle from where it usually is by now, m"""
     moving: bool
     """True if the paddle was sent to a place other than the last"""
 
@@ -65,7 +67,7 @@ class Supervisor:
     Args:
         now: Time of the monotonic clock, s.
         stamp: Time of the robot's clock, s.
-        deviation: Largest gap between the sent and the measured position, m.
+        deviation: Largest distance of an arm from where it usually is by now, m.
     """
 
     def __init__(self, now: float, stamp: float, deviation: float) -> None:
@@ -78,6 +80,7 @@ class Supervisor:
         self.braked_at = 0.0
         """Time at which braking began last."""
         self._stamp, self._heard = stamp, now
+        self._late_since = now
         self._must_let_go = False
 
     def _change(self, now: float, state: DriverState, fault: Fault) -> None:
@@ -124,6 +127,13 @@ class Supervisor:
         """Return True if the paddle must have come down on the table."""
         return bool(self.pressed_at) and now - self.pressed_at > PRESSED
 
+    def _is_late(self, now: float, deviation: float) -> bool:
+        """Return True for an arm that is too late, or late for long while it runs."""
+        runs = self.state is DriverState.RUNNING
+        if not runs or deviation < LATE * self._deviation:
+            self._late_since = now
+        return deviation > self._deviation or now - self._late_since > LATE_TIME
+
     def _near_table(self, now: float, height: float) -> bool:
         above = OFF_TABLE if self._is_down(now) else AWAY + OFF_TABLE
         return -OFF_TABLE <= height <= above
@@ -147,7 +157,7 @@ class Supervisor:
             self.hold(now, Fault.PADDLE_BELOW_TABLE)
         elif self._is_down(now) and measured.height > LIFTED:
             self.hold(now, Fault.PADDLE_LIFTED)
-        elif measured.deviation > self._deviation:
+        elif self._is_late(now, measured.deviation):
             self.hold(now, Fault.DEVIATION)
         elif not now - request.stamp <= STALE:
             self.hold(now, Fault.COMMAND_STALE)
