@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from marl_airhockey.toolkit import Metres
 from marl_airhockey.toolkit.versus import Versus
 
 
@@ -11,7 +12,7 @@ from marl_airhockey.toolkit.versus import Versus
 class Doubles(Versus):
     """Game of two seats at either end, side by side; rules as in `versus.Versus`."""
 
-    apart: float = 0.24
+    apart: Metres = 0.24
     """Distance of mates at the start (m)."""
 
     def __post_init__(self) -> None:

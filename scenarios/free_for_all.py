@@ -10,14 +10,18 @@ import numpy as np
 from marl_airhockey.toolkit import (
     Array,
     GoalLine,
+    Latency,
     Memory,
+    Metres,
     Observable,
     RandomStreams,
     Scenario,
     Scene,
+    Seconds,
     State,
     Table,
     Transition,
+    Weight,
     observables,
     rewards,
     serves,
@@ -40,21 +44,21 @@ class FreeForAll(Scenario):
 
     announced = ("lives", "shots", "stopped", "scorer", "served", "serve")
     seats: str = "arcade"
-    seconds: float = 90.0
-    reaction: float = 0.15
+    seconds: Seconds = 90.0
+    reaction: Latency = 0.15
     sides: int = 4
     """Number of sides of the table, and of seats."""
-    inradius: float = 0.45
+    inradius: Metres = 0.45
     """Distance of each side from the centre (m)."""
     lives: int = 3
     """Number of goals after which a seat is out."""
-    goal_width: float = 0.30
+    goal_width: Metres = 0.30
     """Width of the goal lines (m)."""
-    possession: float = 5.0
+    possession: Seconds = 5.0
     """Longest time that a seat may have the puck in its reach (s)."""
-    shot_weight: float = 0.0
+    shot_weight: Weight = 0.0
     """Reward of a shot on goal that was stopped; its cost for who stopped it."""
-    jitter_weight: float = 0.0
+    jitter_weight: Weight = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,7 +12,9 @@ from marl_airhockey.toolkit import (
     GoalScenario,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
+    Seconds,
     State,
     Transition,
     length,
@@ -33,8 +35,8 @@ class HitGoal(FewShots, GoalScenario):
 
     version: ClassVar[int] = 1
     PATH = True
-    seconds: float = 10.0
-    radius: float = 0.04
+    seconds: Seconds = 10.0
+    radius: Metres = 0.04
     """Radius of the circle (m)."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

@@ -10,10 +10,15 @@ import numpy as np
 
 from marl_airhockey.toolkit import (
     Array,
+    Degrees,
     GoalScenario,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
+    Seconds,
+    Share,
+    Speed,
     State,
     Transition,
     length,
@@ -36,16 +41,16 @@ class HitGoalVelocity(FewShots, GoalScenario):
 
     version: ClassVar[int] = 1
     PATH = True
-    seconds: float = 10.0
+    seconds: Seconds = 10.0
     shots: int = 1
     """Number of distinct touches of which one must succeed."""
-    radius: float = 0.09
+    radius: Metres = 0.09
     """Radius of the circle (m)."""
-    angle: float = 15.0
+    angle: Degrees = 15.0
     """Largest angle to the target velocity (deg)."""
-    speed_share: float = 0.20
+    speed_share: Share = 0.20
     """Largest error of the speed, as a share of the target speed."""
-    speed_slack: float = 0.05
+    speed_slack: Speed = 0.05
     """Further error of the speed (m/s)."""
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:

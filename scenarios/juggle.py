@@ -12,9 +12,11 @@ from marl_airhockey.toolkit import (
     GoalLine,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
     Scenario,
     Scene,
+    Seconds,
     State,
     Transition,
     observables,
@@ -31,10 +33,10 @@ class Juggle(Scenario):
     losing a puck at home ends the episode and costs 2.
     """
 
-    seconds: float = 15.0
+    seconds: Seconds = 15.0
     pucks: int = 1
     """Number of pucks, 1 or 2."""
-    lift: float = 0.3
+    lift: Metres = 0.3
     """Height to which a hit must raise the puck's centre (m)."""
     hits: int = 4
     """Number of hits that is a success."""

@@ -12,8 +12,10 @@ from marl_airhockey.toolkit import (
     Array,
     GoalLine,
     Memory,
+    Metres,
     RandomStreams,
     Scene,
+    Seconds,
     State,
     Transition,
     length,
@@ -34,8 +36,8 @@ class MoveBlock(FewShots):
     """
 
     version: ClassVar[int] = 1
-    seconds: float = 10.0
-    way: float = 0.04
+    seconds: Seconds = 10.0
+    way: Metres = 0.04
     """Displacement of the block by a shot that is a success (m)."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the block."""

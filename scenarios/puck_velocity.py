@@ -10,6 +10,8 @@ from marl_airhockey.toolkit import (
     Array,
     Memory,
     RandomStreams,
+    Seconds,
+    Speed,
     State,
     Transition,
     rewards,
@@ -21,8 +23,8 @@ from marl_airhockey.toolkit.falling import FallingPuck
 class PuckVelocity(FallingPuck):
     """Task that rewards the best upward speed after a touch, and the approach."""
 
-    seconds: float = 5.0
-    fast: float = 1.2
+    seconds: Seconds = 5.0
+    fast: Speed = 1.2
     """Wanted upward speed (m/s)."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

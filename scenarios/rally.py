@@ -10,11 +10,14 @@ import numpy as np
 from marl_airhockey.toolkit import (
     Array,
     Memory,
+    Metres,
     RandomStreams,
     Scenario,
     Scene,
+    Seconds,
     State,
     Transition,
+    Weight,
     length,
     observables,
     rewards,
@@ -36,14 +39,14 @@ class Rally(Scenario):
 
     announced = ("counted", "crossings", "idle")
     seats: str = "arcade"
-    seconds: float = 30.0
+    seconds: Seconds = 30.0
     crossings: int = 15
     """Number of counted crossings that is a success."""
-    depth: float = 0.3
+    depth: Metres = 0.3
     """Distance from the middle beyond which the puck must have been (m)."""
-    patience: float = 4.0
+    patience: Seconds = 4.0
     """Longest time without a counted crossing (s)."""
-    jitter_weight: float = 0.0
+    jitter_weight: Weight = 0.0
 
     @cached_property
     def scene(self) -> Scene:

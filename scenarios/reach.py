@@ -13,8 +13,11 @@ from marl_airhockey.toolkit import (
     GoalScenario,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
     Scene,
+    Seconds,
+    Speed,
     State,
     Transition,
     length,
@@ -32,14 +35,14 @@ class Reach(GoalScenario):
     """
 
     version: ClassVar[int] = 1
-    seconds: float = 3.0
-    radius: float = 0.02
+    seconds: Seconds = 3.0
+    radius: Metres = 0.02
     """Distance that counts as arrival (m)."""
-    speed: float = 0.05
+    speed: Speed = 0.05
     """Speed below which the paddle is at rest (m/s)."""
-    hold: float = 0.1
+    hold: Seconds = 0.1
     """Time that it has to be at rest (s)."""
-    far: float = 0.15
+    far: Metres = 0.15
     """Shortest initial distance of a goal from the paddle (m)."""
 
     @cached_property

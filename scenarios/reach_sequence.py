@@ -11,9 +11,11 @@ from marl_airhockey.toolkit import (
     Array,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
     Scenario,
     Scene,
+    Seconds,
     State,
     Transition,
     length,
@@ -30,12 +32,12 @@ class ReachSequence(Scenario):
     be planned; the last one is also the one after itself. Time costs.
     """
 
-    seconds: float = 6.0
+    seconds: Seconds = 6.0
     count: int = 5
     """Number of goals."""
-    radius: float = 0.03
+    radius: Metres = 0.03
     """Distance that counts as passage (m)."""
-    far: float = 0.12
+    far: Metres = 0.12
     """Shortest distance of a goal from the one before, or from the paddle (m)."""
 
     @cached_property

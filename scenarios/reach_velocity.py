@@ -13,8 +13,11 @@ from marl_airhockey.toolkit import (
     GoalScenario,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
     Scene,
+    Seconds,
+    Speed,
     State,
     Transition,
     length,
@@ -36,18 +39,18 @@ class ReachVelocity(GoalScenario):
     """
 
     version: ClassVar[int] = 1
-    seconds: float = 5.0
-    radius: float = 0.04
+    seconds: Seconds = 5.0
+    radius: Metres = 0.04
     """Distance that counts as arrival (m)."""
-    error: float = 0.10
+    error: Speed = 0.10
     """Largest error of the velocity (m/s)."""
-    window: float = 0.2
+    window: Seconds = 0.2
     """Time of the pass, from the first entry of the circle (s)."""
-    slow: float = 0.2
+    slow: Speed = 0.2
     """Lowest target speed at the goal (m/s)."""
-    fast: float = 0.5
+    fast: Speed = 0.5
     """Highest target speed at the goal (m/s)."""
-    margin: float = 0.08
+    margin: Metres = 0.08
     """Least distance of a goal from every edge of the reach (m)."""
 
     @cached_property

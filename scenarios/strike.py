@@ -10,9 +10,12 @@ import numpy as np
 from marl_airhockey.toolkit import (
     Array,
     Memory,
+    Metres,
     RandomStreams,
     Scenario,
     Scene,
+    Seconds,
+    Speed,
     State,
     Transition,
     length,
@@ -30,10 +33,10 @@ class Strike(Scenario):
     From rest a 0.7 m/s paddle gives at most 1.05 m/s.
     """
 
-    seconds: float = 2.0
-    fast: float = 0.8
+    seconds: Seconds = 2.0
+    fast: Speed = 0.8
     """Wanted speed of the puck (m/s)."""
-    distance: float = 0.3
+    distance: Metres = 0.3
     """Wanted distance of the puck from its start (m)."""
 
     @cached_property

@@ -11,9 +11,11 @@ import numpy as np
 from marl_airhockey.toolkit import (
     Array,
     Memory,
+    Metres,
     RandomStreams,
     Scenario,
     Scene,
+    Seconds,
     State,
     Transition,
     length,
@@ -35,8 +37,8 @@ class StrikeCrowd(Scenario):
     guidance.
     """
 
-    seconds: float = 7.5
-    spread: float = 0.08
+    seconds: Seconds = 7.5
+    spread: Metres = 0.08
     """Wanted sum of displacements (m); a shot at 1.04 m/s gives 0.10 to 0.12."""
     shape: Literal["disc", "square"] = "disc"
     """Shape of the blocks."""

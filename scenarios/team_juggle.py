@@ -12,12 +12,15 @@ from marl_airhockey.toolkit import (
     GoalLine,
     Mark,
     Memory,
+    Metres,
     RandomStreams,
     Scenario,
     Scene,
     Seat,
+    Seconds,
     State,
     Transition,
+    Weight,
     clip,
     observables,
     rewards,
@@ -33,16 +36,16 @@ class TeamJuggle(Scenario):
     each with its own half of the width; a puck that reaches home ends the episode.
     """
 
-    seconds: float = 30.0
+    seconds: Seconds = 30.0
     pucks: int = 1
     """Number of pucks."""
-    lift: float = 0.2
+    lift: Metres = 0.2
     """Height to which a hit must raise the puck's centre (m)."""
     passes: int = 8
     """Number of paid hits that is a success."""
-    gap: float = 0.10
+    gap: Metres = 0.10
     """Distance between the reaches of the seats (m)."""
-    lift_weight: float = 0.0
+    lift_weight: Weight = 0.0
     """Reward of both for any hit that raises a puck by ``lift``, paid or not."""
 
     @cached_property

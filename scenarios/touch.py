@@ -9,6 +9,7 @@ import numpy as np
 from marl_airhockey.toolkit import (
     Array,
     Memory,
+    Seconds,
     Transition,
     length,
     rewards,
@@ -23,7 +24,7 @@ class Touch(FallingPuck):
     Approaching the puck before the first touch is rewarded per metre.
     """
 
-    seconds: float = 5.0
+    seconds: Seconds = 5.0
 
     def update_memory(self, t: Transition) -> Memory:
         return {"gap": rewards.nearest(t)}

@@ -42,9 +42,9 @@ Browser = Annotated[bool, typer.Option(help="Open the page.")]
 Reaction = Annotated[
     float | None,
     typer.Option(
-        help="ms by which programs act late.",
-        min=1000.0 * BOUNDS["reaction"][0],
-        max=1000.0 * BOUNDS["reaction"][1],
+        help="Time by which programs act late, s.",
+        min=BOUNDS["reaction"][0],
+        max=BOUNDS["reaction"][1],
     ),
 ]
 Noise = Annotated[
@@ -107,8 +107,7 @@ def play(
     keywords = environment(backend, profile, option, None, control_dt=kind.CONTROL_DT)
     seats = settings(driver)
     keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
-    delay = None if reaction is None else reaction / 1000.0
-    limits = {"reaction": delay, "noise": noise, "pace": pace}
+    limits = {"reaction": reaction, "noise": noise, "pace": pace}
     given = {name: value for name, value in limits.items() if value is not None}
     with real_table(keywords, lab, rig) as table:
         match = kind(scenario, {}, table, Handicap(**given))

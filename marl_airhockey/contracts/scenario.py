@@ -16,6 +16,7 @@ import numpy as np
 
 from marl_airhockey.contracts.mark import Mark, Meaning
 from marl_airhockey.contracts.observable import Observable
+from marl_airhockey.contracts.units import Latency, Seconds, Weight, check_number
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.geometry import length
 from marl_airhockey.core.parameters import PARAMETERS
@@ -68,15 +69,15 @@ class Scenario(ABC):
     drag_regions: tuple[tuple[float, ...], ...] = ()
     """Discs x, y, radius (m) and the linear drag (1/s) that is added to the puck's
     while its centre is inside, from one control step to the next."""
-    jitter_weight: float = 0.01
+    jitter_weight: Weight = 0.01
     """Cost of a squared change of the commanded velocity, in top speeds."""
-    turning_weight: float = 0.0
+    turning_weight: Weight = 0.0
     """Cost of a sudden change of direction."""
-    reaction: float = 0.0
+    reaction: Latency = 0.0
     """Latency with which seats observe pucks and other paddles, in whole control steps
     (s), in addition to that of the profile's sensing."""
 
-    seconds: float
+    seconds: Seconds
     """Length of an episode, s."""
 
     announced: ClassVar[tuple[str, ...]] = ()
@@ -101,9 +102,11 @@ class Scenario(ABC):
             value = getattr(self, f.name)
             if isinstance(value, np.generic):
                 object.__setattr__(self, f.name, value := value.item())
-            _check_number(f.name, f.type, value)
+            check_number(f.name, f.type, value)
         if self.seconds == 0:
             raise ValueError("seconds: must be above 0")
+        for name in ELEMENTS:
+            _check_places(name, getattr(self, name), self.scene.table)
         if self.obstacles and not self.scene.obstacles:
             raise ValueError("obstacles: this scenario's own table takes none")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
@@ -370,31 +373,34 @@ def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
     return found
 
 
+def _check_places(
+    name: str, elements: tuple[tuple[float, ...], ...], table: Table
+) -> None:
+    """Refuse elements that are not on the table.
+
+    Raises:
+        ValueError: One of them, named.
+    """
+    half = np.abs(table.vertices).max(0)
+    for k, element in enumerate(elements):
+        x, y, radius = element[:3]
+        ends = np.array([[x, y], element[3:5] if len(element) == 5 else [x, y]])
+        # A bar may lie across the table with both ends outside.
+        nearest = np.maximum(ends.min(0), np.minimum(ends.max(0), 0.0))
+        if (np.abs(nearest) - radius > half).any() or radius > 2 * half.max():
+            raise ValueError(
+                f"{name}: element {k}, {element}, is not on the table, which reaches "
+                f"from -{half[0]:g} to {half[0]:g} m and from -{half[1]:g} to "
+                f"{half[1]:g} m"
+            )
+
+
 def _sums(points: Array, regions: tuple[tuple[float, ...], ...]) -> Array:
     """(..., n) sums of the last numbers of the regions that have points (..., n, 2)."""
     total = np.zeros_like(points[..., 0])
     for x, y, radius, value in regions:
         total = total + value * (length(points - np.array([x, y])) < radius)
     return total
-
-
-def _check_number(name: str, kind: object, value: object) -> None:
-    """Refuse a value of a numeric field that is no usable number."""
-    if kind not in ("int", "float"):
-        return
-    if isinstance(value, (tuple, list)):
-        raise ValueError(
-            f"{name}: {value!r} is a range; rules and geometry are fixed when built, "
-            "only physics can be sampled per episode"
-        )
-    whole = kind == "int"
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ValueError(f"{name}: expected a number, got {value!r}")
-    least = 1 if whole else 0
-    fits = isinstance(value, int) or not whole
-    if not (np.isfinite(value) and value >= least and fits):
-        words = "a whole number of at least 1" if whole else "a number of at least 0"
-        raise ValueError(f"{name}: {value!r} must be {words}")
 
 
 class GoalScenario(Scenario):

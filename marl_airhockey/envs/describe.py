@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario, Transition
+from marl_airhockey.contracts.units import range_of
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.profiles import PROFILES, delay_of, find_profile
 from marl_airhockey.core.rng import RandomStreams
@@ -129,6 +130,7 @@ def describe(name: str) -> dict[str, Any]:
             {
                 "option": f.name,
                 "default": getattr(scenario, f.name),
+                "range": range_of(str(f.type)),
                 "meaning": options.get(f.name, ""),
             }
             for f in dataclasses.fields(scenario)

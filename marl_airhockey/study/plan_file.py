@@ -33,8 +33,8 @@ class _OpponentTable:
 
     name: str
     label: str = ""
-    reaction: float = 1000.0 * Handicap.reaction
-    """Delay of its actions, ms."""
+    reaction: float = Handicap.reaction
+    """Delay of its actions, s."""
     noise: float = Handicap.noise
     pace: float = Handicap.pace
 
@@ -71,7 +71,7 @@ def _opponent(row: Any) -> Opponent:
     named = {"name": row} if isinstance(row, str) else row
     table = _build(_OpponentTable, "an opponent", named)
     try:
-        handicap = Handicap(table.reaction / 1000.0, table.noise, table.pace)
+        handicap = Handicap(table.reaction, table.noise, table.pace)
     except ValueError as error:
         raise ValueError(f"opponent {table.name}: {error}") from error
     return Opponent(table.name, table.label, handicap)

@@ -6,6 +6,15 @@ from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
 from marl_airhockey.contracts.mark import Mark
 from marl_airhockey.contracts.observable import Observable
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario, Transition
+from marl_airhockey.contracts.units import (
+    Degrees,
+    Latency,
+    Metres,
+    Seconds,
+    Share,
+    Speed,
+    Weight,
+)
 from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.core.geometry import clip, length
 from marl_airhockey.core.rng import RandomStreams
@@ -17,11 +26,14 @@ from marl_airhockey.types import Array, Memory
 
 __all__ = [
     "Array",
+    "Degrees",
     "Driver",
     "GoalLine",
     "GoalScenario",
+    "Latency",
     "Mark",
     "Memory",
+    "Metres",
     "Observable",
     "Obstacle",
     "PrescribedMotion",
@@ -29,10 +41,14 @@ __all__ = [
     "Scenario",
     "Scene",
     "Seat",
+    "Seconds",
+    "Share",
+    "Speed",
     "State",
     "Table",
     "Transition",
     "View",
+    "Weight",
     "clip",
     "length",
     "require",

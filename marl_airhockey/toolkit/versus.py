@@ -10,6 +10,7 @@ import numpy as np
 
 from marl_airhockey.contracts.observable import Observable
 from marl_airhockey.contracts.scenario import Scenario, Transition
+from marl_airhockey.contracts.units import Latency, Metres, Seconds, Weight
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import GoalLine, Scene
 from marl_airhockey.core.state import State
@@ -30,21 +31,21 @@ class Versus(Scenario):
 
     announced = ("goals", "stopped", "serve")
     seats: str = "arcade"
-    seconds: float = 60.0
-    reaction: float = 0.15
+    seconds: Seconds = 60.0
+    reaction: Latency = 0.15
     goals_to_win: int = 7
     """Number of goals that wins."""
     pucks: int = 1
     """Number of pucks in play."""
-    goal_width: float = 0.30
+    goal_width: Metres = 0.30
     """Width of the goal lines (m)."""
-    possession: float = 5.0
+    possession: Seconds = 5.0
     """Longest time that a team may have a puck in its reach (s)."""
-    scored_weight: float = 1.0
+    scored_weight: Weight = 1.0
     """Reward of a goal; to concede one costs 1."""
-    shot_weight: float = 0.0
+    shot_weight: Weight = 0.0
     """Reward of a shot on goal that was stopped; its cost for who stopped it."""
-    jitter_weight: float = 0.0
+    jitter_weight: Weight = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -69,16 +69,16 @@ class Soak:
         self.robot.enable()
 
     def _watch_cycles(self) -> None:
-        """Measure how long each cycle of the present driver takes."""
+        """Measure the CPU time of each cycle of the present driver."""
         driver = self.robot.driver
         cycle = driver.cycle
 
         def timed() -> None:
-            began, now = time.perf_counter(), self.robot.now
+            began, now = time.thread_time(), self.robot.now
             cycle()
             # A call that waits for the controller emulates it meanwhile.
             if self.robot.now == now:
-                self.longest = max(self.longest, time.perf_counter() - began)
+                self.longest = max(self.longest, time.thread_time() - began)
             self.cycles += 1
 
         driver.cycle = timed  # type: ignore[method-assign]
@@ -182,7 +182,7 @@ class Soak:
             "hours": hours,
             "cycles": self.cycles,
             "faults": self.faults,
-            "longest_cycle_ms": round(1e3 * self.longest, 2),
+            "longest_cycle_cpu_ms": round(1e3 * self.longest, 2),
             "top_speed": round(self.top, 4),
             "limit": self.limit,
             "leaps": int(self.leaps),

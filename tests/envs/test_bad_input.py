@@ -1,6 +1,6 @@
 """Every mistake gets one clear error that names it; a reset makes the env usable."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import gymnasium
@@ -11,6 +11,7 @@ from pair import Pair
 import marl_airhockey as ah
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.contracts.units import UNITS
 from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
@@ -133,6 +134,42 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
 def test_it_is_refused_when_built(build, words):
     with pytest.raises(ValueError, match=words.replace("(", r"\(")):
         build()
+
+
+def numeric_options():
+    """Return the scenario, the name and the unit of every numeric option."""
+    return [
+        pytest.param(game, f.name, UNITS[f.type], id=f"{game}-{f.name}")
+        for game in ah.scenario_names()
+        for f in fields(ah.make_scenario(game))
+        if f.type in UNITS
+    ]
+
+
+@pytest.mark.parametrize(("game", "name", "unit"), numeric_options())
+def test_every_numeric_option_has_bounds(game, name, unit):
+    above = unit.most + 1
+    for value in (unit.least - 1, above, np.nan, np.inf, "far", True, (0.1, 0.2)):
+        with pytest.raises(ValueError, match=rf"{name}: .*(must be|expected|a range)"):
+            ah.make_scenario(game, **{name: value})
+    with pytest.raises(ValueError, match=f"from {unit.least:g} to {unit.most:g}"):
+        ah.make_scenario(game, **{name: int(above)})
+
+
+@pytest.mark.parametrize(
+    ("name", "element"),
+    [
+        ("obstacles", [3.0, 0.0, 0.1]),
+        ("obstacles", [0.0, -0.5, 0.1]),
+        ("obstacles", [0.0, 0.5, 0.05, 0.3, 0.6]),
+        ("obstacles", [0.0, 0.0, 40.0]),
+        ("reward_regions", [1.2, 0.0, 0.1, 1.0]),
+        ("drag_regions", [0.0, 0.9, 0.1, 1.0]),
+    ],
+)
+def test_elements_that_are_not_on_the_table_are_refused(name, element):
+    with pytest.raises(ValueError, match=f"{name}: element 0, .* not on the table"):
+        ah.make_scenario("juggle", **{name: [element]})
 
 
 @pytest.mark.parametrize("name", [n for n, p in PARAMETERS.items() if not p.arms])

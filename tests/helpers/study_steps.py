@@ -12,7 +12,7 @@ scenario = "duel"
 version = "3"
 information = "First.\\n\\nSecond."
 agree = ["Yes."]
-opponents = ["still", {name = "striker", reaction = 100}]
+opponents = ["still", {name = "striker", reaction = 0.1}]
 games = 1
 practice = 1
 practice_opponent = "still"

@@ -206,7 +206,7 @@ def test_a_taken_port_is_named():
         )
     assert done.returncode == 1
     assert f"--port {port}" in done.stderr
-    for bad in (["--port", "99999"], ["--reaction", "900"], ["--opponent", "policy"]):
+    for bad in (["--port", "99999"], ["--reaction", "0.9"], ["--opponent", "policy"]):
         done = airhockey("play", "duel", *bad, ok=False)
         assert done.returncode in (1, 2)
         assert "Traceback" not in done.stderr

@@ -21,7 +21,7 @@ scenario = "duel"
 version = "3"
 information = "First."
 agree = ["Yes."]
-opponents = ["still", "goalkeeper", {name = "striker", reaction = 100}]
+opponents = ["still", "goalkeeper", {name = "striker", reaction = 0.1}]
 games = 2
 practice = 1
 practice_opponent = "still"
@@ -85,7 +85,7 @@ def test_a_study_of_24_people_loses_nothing(tmp_path):
                 # No goal can end the game so soon after the countdown.
                 person.game(study, client, ticks=round((COUNTDOWN + 0.25) * RATE))
                 assert study.match.phase == "play"
-                study.host.recorder._writer._lock.close()  # As a kill does.
+                study.host.recorder._writer._lock.release()  # As a kill does.
                 study = open_study(plan, out)
                 client, crashes = enter(study, person.key), False
             elif where == "ready":

@@ -119,7 +119,7 @@ def test_whoever_withdraws_is_erased_and_leaves_no_gap(plan, tmp_path):
 
 
 def test_people_play_each_other_and_either_can_withdraw(plan, tmp_path):
-    text = PLAN.replace('"still", {name = "striker", reaction = 100}', '"person"')
+    text = PLAN.replace('"still", {name = "striker", reaction = 0.1}', '"person"')
     out = tmp_path / "out"
     study = open_study(plan(text), out)
     subject, partner = enter(study, "a"), enter(study, "b")
@@ -223,7 +223,7 @@ def test_whom_the_leader_erases_is_out(plan, tmp_path):
 def test_rest_is_a_rest_and_a_task_needs_no_opponent(plan, tmp_path):
     text = (
         PLAN.replace('"duel"', '"juggle"')
-        .replace('opponents = ["still", {name = "striker", reaction = 100}]', "")
+        .replace('opponents = ["still", {name = "striker", reaction = 0.1}]', "")
         .replace("practice = 1", "practice = 0")
     )
     study = open_study(plan(text), tmp_path / "a")

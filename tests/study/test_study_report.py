@@ -25,8 +25,8 @@ FREE = PLAN.replace(
     '{id = "fun", text = "Fun?"}', '{id = "why", text = "?", free = true}'
 )
 NAMED = FREE.replace(
-    '{name = "striker", reaction = 100}',
-    '{name = "striker", label = "=slow | steady", reaction = 100}',
+    '{name = "striker", reaction = 0.1}',
+    '{name = "striker", label = "=slow | steady", reaction = 0.1}',
 ).replace("version", 'debriefing = "All were programs."\nversion')
 DEVICE = {"input": "touch", "width": 390, "height": 760, "density": 3.0, "hz": 60.0}
 
@@ -51,7 +51,7 @@ def folder(tmp_path_factory):
         study.receive(client, aim(-0.4, 0.1))
         study.tick()
         client.limiter._level = 100.0
-    study.host.recorder._writer._lock.close()
+    study.host.recorder._writer._lock.release()
     study = open_study(plan, out)  # The server was killed and runs again.
     client = enter(study, "a")
     study.receive(client, line("device", **DEVICE))
