@@ -11,14 +11,13 @@ row to ``docs/data/announced.csv``; a run whose row is there is not trained agai
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from rows import Row, keep, read
+from rows import DATA, Again, Book, Row, RowsFile, compute, read
 
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
@@ -80,7 +79,7 @@ STUDIES = {
 * drag regions: a disc in the middle of the table that slows the puck at 2 1/s.
 """
 EPISODES = 500
-ROWS = Path(__file__).parents[2] / "docs" / "data" / "announced.csv"
+ROWS = DATA / "announced.csv"
 KEY = ("study", "case", "seed")
 
 
@@ -135,11 +134,14 @@ def table() -> list[list[str]]:
                     float(np.mean([float(row[column]) for row in own]))
                     for column in ("success", "return")
                 )
-                low, high = interval(mean, EPISODES * len(own))
+                low, high = interval(mean, EPISODES)
                 share = f"{mean:.3f} ({low:.3f} .. {high:.3f})"
                 steps = f"{int(own[0]['steps']) / 1e6:.2f} M"
                 found.append([name, case, share, f"{back:.2f}", steps, str(len(own))])
     return found
+
+
+BOOK = Book(ROWS, KEY, order)
 
 
 def main(
@@ -150,6 +152,8 @@ def main(
         "runs/announced"
     ),
     show: Annotated[bool, typer.Option(help="Print the table; train nothing.")] = False,
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
     """Train what has no row yet."""
     if show:
@@ -158,19 +162,13 @@ def main(
             if k == 0:
                 print(f"| {' | '.join(['---'] * len(cells))} |")
         return
-    known = {tuple(row[name] for name in KEY) for row in read(ROWS)}
-    wanted = [
+    cells = [
         (name, case, seed)
         for seed in range(seeds)
         for name in studies.split(",")
         for case in STUDIES[name].cases
-        if (name, case, str(seed)) not in known
     ]
-    with ProcessPoolExecutor(jobs) as pool:
-        runs = [pool.submit(train_case, *run, folder) for run in wanted]
-        for run in as_completed(runs):
-            keep(ROWS, run.result(), order)
-            print(run.result(), flush=True)
+    compute(BOOK.at(rows), cells, train_case, folder, jobs, again)
 
 
 if __name__ == "__main__":

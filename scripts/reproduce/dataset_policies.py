@@ -6,7 +6,8 @@ Each task is trained with its preset until half of the expert's success is reach
 expert is the zoo's policy. Kept are the policy at the evaluation nearest to that half,
 `medium`, and those at a third and at two thirds of the steps until then, `early` and
 `middle`. Success is that of sampled actions, as datasets have them. It takes about ten
-minutes of one core; tasks whose policies exist are not trained again.
+minutes of one core; tasks whose policies exist are not trained again, but for
+``--again``.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rows import Again
 
 from marl_airhockey.data.benchmark.catalogue import SNAPSHOTS, TASKS, snapshot
 from marl_airhockey.evaluation.evaluate import evaluate
@@ -90,13 +92,16 @@ def main(
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
         "runs/medium"
     ),
+    again: Again = False,
 ) -> None:
     """Train the tasks whose policies are missing."""
     for task in TASKS:
-        if not snapshot(task, "medium").exists():
-            shutil.rmtree(out / task, ignore_errors=True)
-            found = train_task(task, out / task)
-            print(task, {level: round(x, 3) for level, x in found.items()}, flush=True)
+        if snapshot(task, "medium").exists() and not again:
+            print(f"{task}: its policies are there; --again trains them")
+            continue
+        shutil.rmtree(out / task, ignore_errors=True)
+        found = train_task(task, out / task)
+        print(task, {level: round(x, 3) for level, x in found.items()}, flush=True)
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@
 Each dataset adds a row to ``docs/data/datasets.csv``: steps, episodes, success, mean
 return, MB, seconds of CPU time to build it, and the checksum of its columns. The rows
 become the `published.json` of the library. A dataset whose row is there is not built
-again; with ``--check`` it is, and its checksum is compared. ``--table`` prints the
+again; with ``--again`` it is, and with ``--check``, which compares its checksum alone.
+``--rows FILE`` keeps the rows elsewhere. ``--table`` prints the
 tables of the docs. Built datasets are removed afterwards unless they are kept.
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 import time
@@ -21,6 +21,7 @@ from statistics import mean
 from typing import Annotated, Any, get_type_hints
 
 import typer
+from rows import DATA, Again, Book, Row, RowsFile, read, write
 
 from marl_airhockey.data.benchmark.build import build_dataset
 from marl_airhockey.data.benchmark.catalogue import TIERS, datasets, find_dataset
@@ -31,8 +32,7 @@ from marl_airhockey.data.benchmark.content import (
     normalized_score,
 )
 
-ROWS = Path(__file__).parents[2] / "docs" / "data" / "datasets.csv"
-"""File of the committed rows"""
+BOOK = Book(DATA / "datasets.csv", ("name",))
 DIGITS = {"success": 6, "returns": 4, "megabytes": 1, "cpu_seconds": 1}
 
 
@@ -45,21 +45,17 @@ def measure(name: str, folder: Path) -> dict[str, Any]:
     return {k: round(v, DIGITS[k]) if k in DIGITS else v for k, v in row.items()}
 
 
-def read() -> dict[str, dict[str, Any]]:
+def read_rows(path: Path) -> dict[str, Row]:
     """Return the rows by name; none if there is no file."""
-    if not ROWS.exists():
-        return {}
-    with ROWS.open(newline="") as file:
-        return {row["name"]: row for row in csv.DictReader(file)}
+    return {row["name"]: row for row in read(path)}
 
 
-def keep(rows: dict[str, dict[str, Any]]) -> None:
-    """Write the rows, in the order of the catalogue, and `published.json`."""
+def keep(path: Path, rows: dict[str, Row]) -> None:
+    """Write the rows, in the order of the catalogue; publish the committed ones."""
     ordered = [rows[name] for name in datasets() if name in rows]
-    with ROWS.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(ordered[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(ordered)
+    write(path, ordered)
+    if path != BOOK.path:
+        return
     kinds = get_type_hints(Content)
     contents = {
         row["name"]: {name: kind(row[name]) for name, kind in kinds.items()}
@@ -110,24 +106,25 @@ def main(
     out: Annotated[Path, typer.Option(help="Folder of the datasets.")] = Path(
         "runs/sets"
     ),
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
     """Build datasets and keep their rows."""
-    rows = read()
+    book, chosen = BOOK.at(rows), names.split(",") if names else [*datasets()]
+    known = read_rows(book.path)
     if table:
-        for cells in (*table_of(rows), *tiers_of(rows)):
+        for cells in (*table_of(known), *tiers_of(known)):
             print(f"| {' | '.join(cells)} |")
         return
-    for name in names.split(",") if names else datasets():
-        if name in rows and not check:
-            continue
+    for (name,) in book.missing([(name,) for name in chosen], again or check):
         row = measure(name, out / name)
         shutil.rmtree(out / name)
-        if check and name in rows:
-            same = row["checksum"] == rows[name]["checksum"]
+        if check and name in known:
+            same = row["checksum"] == known[name]["checksum"]
             print(name, "same content" if same else "OTHER content", flush=True)
             continue
-        rows[name] = row
-        keep(rows)
+        known[name] = row
+        keep(book.path, known)
         print(row, flush=True)
 
 

@@ -142,8 +142,9 @@ def main(
             for name, rows in folders.items()
             for seed, folder in enumerate(rows)
         ]
-        for done in waiting:
+        for k, done in enumerate(waiting, 1):
             done.result()
+            print(f"{k} of {len(waiting)} runs are there, in {out}", flush=True)
     for name, rows in folders.items():
         console.rule(name)
         if name in COOPERATIVE:

@@ -12,12 +12,11 @@ A run whose row is there is not trained again, and one that was cut off resumes.
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rows import Row, keep, read
+from rows import DATA, Again, Book, Row, RowsFile, compute, read
 
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.hindsight.config import hindsight_config
@@ -37,7 +36,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "tqc": {"critics": "quantiles"},
 }
 """Settings by the name of a variant"""
-ROWS = Path(__file__).parents[2] / "docs" / "data" / "hindsight.csv"
 KEY = ("task", "variant", "seed")
 EPISODES = 500
 
@@ -72,6 +70,9 @@ def order(row: Row) -> tuple[Any, ...]:
     return list(STEPS).index(row["task"]), row["variant"], int(row["seed"])
 
 
+BOOK = Book(DATA / "hindsight.csv", KEY, order)
+
+
 def main(
     tasks: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(STEPS),
     variants: Annotated[str, typer.Option(help="Comma-separated.")] = ",".join(
@@ -82,21 +83,17 @@ def main(
     folder: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path(
         "runs/hindsight"
     ),
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
     """Train what has no row yet."""
-    known = {tuple(row[name] for name in KEY) for row in read(ROWS)}
-    wanted = [
+    cells = [
         (task, variant, seed)
         for seed in range(seeds)
         for task in tasks.split(",")
         for variant in variants.split(",")
-        if (task, variant, str(seed)) not in known
     ]
-    with ProcessPoolExecutor(jobs) as pool:
-        runs = [pool.submit(train_run, *run, folder) for run in wanted]
-        for run in as_completed(runs):
-            keep(ROWS, run.result(), order)
-            print(run.result(), flush=True)
+    compute(BOOK.at(rows), cells, train_run, folder, jobs, again)
 
 
 if __name__ == "__main__":

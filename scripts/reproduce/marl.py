@@ -17,7 +17,6 @@ measured at the end, by its most likely actions, over episodes it was not traine
 
 from __future__ import annotations
 
-import csv
 import tempfile
 import time
 from collections.abc import Callable
@@ -32,6 +31,7 @@ from benchmarl.experiment import Experiment, ExperimentConfig
 from benchmarl.models.mlp import MlpConfig
 from rich.console import Console
 from rich.table import Table
+from rows import DATA, Again, Book, Cell, Row, RowsFile, read
 from torchrl.envs import EnvBase
 from torchrl.envs.utils import ExplorationType, set_exploration_type
 
@@ -48,9 +48,8 @@ GAMES: dict[str, dict[str, Any]] = {
 SCRIPTS = ("striker", "allround")
 """Drivers that are measured beside what was learned"""
 WORLDS, EPISODES = 100, 500
-DATA = Path(__file__).parents[2] / "docs" / "data" / "marl.csv"
 FIELDS = ("game", "policy", "seed", "frames", "success", "team_return", "cpu_minutes")
-Row = dict[str, Any]
+BOOK = Book(DATA / "marl.csv", FIELDS[:3])
 
 
 class AirHockey(TaskClass):  # type: ignore[misc]
@@ -185,29 +184,10 @@ def play_script(game: str, name: str) -> Row:
     return dict(zip(FIELDS, values, strict=True))
 
 
-def read() -> list[dict[str, str]]:
-    """Return the rows there are."""
-    if not DATA.exists():
-        return []
-    with DATA.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def add(row: Row) -> None:
-    """Write a row at the end of the file."""
-    new = not DATA.exists()
-    row |= {k: round(v, 4) for k, v in row.items() if isinstance(v, float)}
-    with DATA.open("a", newline="") as file:
-        writer = csv.DictWriter(file, FIELDS)
-        if new:
-            writer.writeheader()
-        writer.writerow(row)
-
-
-def print_table() -> None:
+def print_table(path: Path) -> None:
     """Print means over seeds, the least and the greatest beside them."""
     headers = "game", "policy", "seeds", "frames", "success", "return", "CPU-min a seed"
-    table, rows = Table(*headers), read()
+    table, rows = Table(*headers), read(path)
     for game, policy in dict.fromkeys((row["game"], row["policy"]) for row in rows):
         mine = [r for r in rows if (r["game"], r["policy"]) == (game, policy)]
         table.add_row(
@@ -228,21 +208,31 @@ def main(
     games: Annotated[list[str] | None, typer.Argument(help="All by default.")] = None,
     seeds: Annotated[int, typer.Option(help="Runs of each algorithm.")] = 3,
     frames: Annotated[int, typer.Option(help="Steps of a world in a run.")] = 500_000,
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
     """Train what has no row yet, then print the table."""
     torch.set_num_threads(1)
     chosen = games or list(GAMES)
-    done = {(row["game"], row["policy"], row["seed"]) for row in read()}
-    for game in chosen:
-        for name in SCRIPTS:
-            if (game, name, "") not in done:
-                add(play_script(game, name))
-    for seed in range(seeds):
-        for game in chosen:
-            for algorithm in ALGORITHMS:
-                if (game, algorithm, str(seed)) not in done:
-                    add(train_cell(game, algorithm, seed, frames))
-    print_table()
+    book = BOOK.at(rows)
+    cells: list[Cell] = [(game, name, "") for game in chosen for name in SCRIPTS]
+    cells += [
+        (game, algorithm, seed)
+        for seed in range(seeds)
+        for game in chosen
+        for algorithm in ALGORITHMS
+    ]
+    for game, policy, seed in book.missing(cells, again):
+        scripted = policy in SCRIPTS
+        row = (
+            play_script(game, policy)
+            if scripted
+            else train_cell(game, policy, seed, frames)
+        )
+        row |= {k: round(v, 4) for k, v in row.items() if isinstance(v, float)}
+        book.keep(row)
+        print(row, flush=True)
+    print_table(book.path)
 
 
 if __name__ == "__main__":

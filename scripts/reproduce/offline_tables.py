@@ -70,13 +70,16 @@ def read(name: str) -> list[Row]:
 
 
 def success_of(rows: list[Row], *cell: str) -> tuple[float, int] | None:
-    """Return the mean success of a domain, tier, task and algorithm, and episodes."""
+    """Return the mean success of a domain, tier, task and algorithm, and episodes.
+
+    All seeds play the same episodes.
+    """
     names = ("domain", "tier", "task", "algo")
     own = [row for row in rows if tuple(row[name] for name in names) == cell]
     if not own:
         return None
     mean = float(np.mean([float(row["success"]) for row in own]))
-    return mean, sum(int(row["episodes"]) for row in own)
+    return mean, min(int(row["episodes"]) for row in own)
 
 
 def chance_of(domain: str, task: str, rows: list[Row]) -> float:
@@ -100,11 +103,11 @@ def rl_of(domain: str, task: str, rows: list[Row]) -> tuple[float, int] | None:
         for row in read("tasks.csv")
         if (row["task"], row["profile"], row["variant"]) == (task, "ideal", "")
     ]
-    return (float(np.mean(values)), episodes * len(values)) if values else None
+    return (float(np.mean(values)), episodes) if values else None
 
 
 def shown(found: tuple[float, int] | None) -> str:
-    """Return a success with its 95 % interval over all episodes."""
+    """Return a success with its 95 % interval."""
     if found is None:
         return "-"
     low, high = interval(*found)

@@ -1,13 +1,28 @@
-"""Rows of results that scripts keep in CSV files, one for each run that has ended."""
+"""Rows of results in a CSV file, one for each cell of a table that is computed."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 Row = dict[str, Any]
+Cell = tuple[Any, ...]
+DATA = Path(__file__).parents[2] / "docs" / "data"
+"""Folder of the committed rows"""
+Again = Annotated[
+    bool, typer.Option("--again", help="Compute what has a row, too, in new folders.")
+]
+RowsFile = Annotated[
+    Path | None, typer.Option("--rows", help="File of the rows instead of docs/data.")
+]
 
 
 def read(path: Path) -> list[Row]:
@@ -18,18 +33,119 @@ def read(path: Path) -> list[Row]:
         return list(csv.DictReader(file))
 
 
-def keep(path: Path, row: Row, order: Callable[[Any], Any]) -> None:
-    """Add a row to those of a CSV file, in order; the file is replaced as a whole.
+def write(path: Path, rows: Sequence[Row]) -> None:
+    """Replace a CSV file as a whole."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_suffix(".part")
+    with draft.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    draft.replace(path)
+
+
+def run_folder(folder: Path, again: bool) -> Path:
+    """Return the folder of runs; those of ``--again`` have one of their own."""
+    return folder / "again" if again else folder
+
+
+@dataclass(frozen=True)
+class Book:
+    """Rows in a file, one for each cell.
 
     Args:
         path: Path of the file.
-        row: New row, with the columns of all.
-        order: Function of a row, all strings, that returns what it is sorted by.
+        key: Columns that name a cell.
+        order: Function of a row, all strings, that returns what it is sorted by; None
+            keeps the order of the file.
     """
-    rows = [*read(path), {name: str(value) for name, value in row.items()}]
-    draft = path.with_suffix(".part")
-    with draft.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(row), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(sorted(rows, key=order))
-    draft.replace(path)
+
+    path: Path
+    key: tuple[str, ...]
+    order: Callable[[Row], Any] | None = None
+
+    def at(self, path: Path | None) -> Book:
+        """Return the same for another file, if one is given."""
+        return Book(path, self.key, self.order) if path else self
+
+    def _cell(self, row: Row) -> tuple[str, ...]:
+        return tuple(str(row[name]) for name in self.key)
+
+    def keep(self, row: Row) -> None:
+        """Add a row, in place of that of the same cell."""
+        new = {name: str(value) for name, value in row.items()}
+        rows = read(self.path)
+        cells = [self._cell(old) for old in rows]
+        if self._cell(new) in cells:
+            rows[cells.index(self._cell(new))] = new
+        else:
+            rows.append(new)
+        write(self.path, sorted(rows, key=self.order) if self.order else rows)
+
+    def missing(self, cells: Sequence[Cell], again: bool = False) -> list[Cell]:
+        """Return the cells to compute; print how many rows are there.
+
+        Args:
+            cells: Cells that are wanted.
+            again: Whether those with a row are to be computed, too.
+        """
+        known = {self._cell(row) for row in read(self.path)}
+        there = [cell for cell in cells if tuple(map(str, cell)) in known]
+        wanted = list(cells) if again else [c for c in cells if c not in there]
+        print(f"{self.path}: {len(there)} of {len(cells)} rows are there", flush=True)
+        for cell in wanted:
+            print("  to compute:", " ".join(map(str, cell)), flush=True)
+        if not wanted:
+            print("nothing to compute; --again does, --rows FILE keeps it elsewhere")
+        return wanted
+
+    def fill(
+        self,
+        cells: Sequence[Cell],
+        work: Callable[..., Any],
+        jobs: int,
+        kept: Callable[[Any], None] | None = None,
+    ) -> None:
+        """Compute cells in processes of their own, keep and print each row at once.
+
+        Args:
+            cells: Cells; what names one is what ``work`` is called with.
+            work: Function that returns the row of a cell.
+            jobs: Cells at a time.
+            kept: Function that keeps what ``work`` returns, if that is a tuple that
+                begins with a row.
+        """
+        began = time.monotonic()
+        with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
+            running = [pool.submit(work, *cell) for cell in cells]
+            try:
+                for k, done in enumerate(as_completed(running), 1):
+                    row = done.result()
+                    (kept or self.keep)(row)
+                    minutes = (time.monotonic() - began) / 60
+                    shown = row if kept is None else row[0]
+                    print(
+                        f"{k} of {len(cells)}, {minutes:.1f} min: {shown}", flush=True
+                    )
+            except BaseException:
+                # What has ended is kept; do not wait for all the others.
+                pool.shutdown(cancel_futures=True)
+                raise
+
+
+def compute(
+    book: Book,
+    cells: Sequence[Cell],
+    work: Callable[..., Row],
+    folder: Path,
+    jobs: int,
+    again: bool,
+) -> None:
+    """Compute the cells of a book that are missing; ``work`` takes a folder as well."""
+    place = run_folder(folder, again)
+    book.fill(book.missing(cells, again), partial(in_folder, work, place), jobs)
+
+
+def in_folder(work: Callable[..., Row], folder: Path, *cell: Any) -> Row:
+    """Return the row of a cell, computed in a folder."""
+    return work(*cell, folder)

@@ -15,14 +15,14 @@ Each cell that ends adds a row to the CSV; one whose row is there is not played 
 
 from __future__ import annotations
 
-import csv
 import itertools
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
+from rows import DATA, Again, Book, RowsFile
 
 from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
 from marl_airhockey.core.rng import RandomStreams
@@ -47,7 +47,7 @@ FILTERS = (
 AUTHORS = PRESETS["authors"]
 LIMITS = {
     "ur5e": PRESETS["ur5e"],
-    "none": replace(AUTHORS, servo=replace(PRESETS["ur5e"].servo, deviation=9.0)),
+    "none": replace(AUTHORS, servo=replace(PRESETS["ur5e"].servo, deviation=5.0)),
     "authors": AUTHORS,
 }
 CELLS = (
@@ -174,26 +174,30 @@ def measure(
     }
 
 
+BOOK = Book(DATA / "smoothing.csv", COLUMNS[:5])
+
+
 def main(
     episodes: Annotated[int, typer.Option(help="Episodes of each cell.")] = 50,
-    out: Annotated[Path, typer.Option(help="CSV of the rows.")] = Path(
-        "docs/data/smoothing.csv"
-    ),
+    jobs: Annotated[int, typer.Option(help="Cells at a time.")] = 2,
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
-    """Play the cells whose rows are missing and print all rows."""
-    rows = [*csv.DictReader(out.open())] if out.exists() else []
-    known = {tuple(row[name] for name in COLUMNS[:5]) for row in rows}
-    for task, commands, limits, smoothing in CELLS:
-        cell = task, commands, limits, smoothing.name, f"{smoothing.time:g}"
-        if cell in known:
-            continue
-        row = measure(task, commands, limits, smoothing, episodes)
-        with out.open("a", newline="") as file:
-            table = csv.DictWriter(file, COLUMNS)
-            if not file.tell():
-                table.writeheader()
-            table.writerow(dict(zip(COLUMNS[:5], cell, strict=True)) | row)
-        print(*cell, *row.values(), flush=True)
+    """Play the cells whose rows are missing."""
+    book = BOOK.at(rows)
+    cells = {
+        (task, commands, limits, smoothing.name, f"{smoothing.time:g}"): smoothing
+        for task, commands, limits, smoothing in CELLS
+    }
+    wanted = book.missing(list(cells), again)
+    with ProcessPoolExecutor(jobs) as pool:
+        running = {
+            cell: pool.submit(measure, *cell[:3], cells[cell], episodes)
+            for cell in wanted
+        }
+        for cell, done in running.items():
+            book.keep(dict(zip(COLUMNS[:5], cell, strict=True)) | done.result())
+            print(*cell, *done.result().values(), flush=True)
 
 
 if __name__ == "__main__":

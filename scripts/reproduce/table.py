@@ -8,7 +8,8 @@
 
 BC and IQL learn from 100,000 steps of an expert, 20,000 and 40,000 steps of the
 gradient. A cell that ends adds a row to ``docs/data/offline.csv``; one whose row is
-there is not trained again, so the script can be stopped and started.
+there is not trained again, so the script can be stopped and started. ``--again --rows
+mine.csv`` trains all and keeps the rows elsewhere.
 
 * 2d: data are ``airhockey/TASK/expert-v0``, or of another tier; 500 episodes on numba.
 * robosuite: data are of the zoo's policy on robosuite; 50 episodes there.
@@ -24,13 +25,13 @@ tables of these rows.
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rows import Row, keep, read
+from rows import DATA, Again, Book, Row, RowsFile, in_folder, read, run_folder
 
 from marl_airhockey import make_agent
 from marl_airhockey.contracts.driver import Driver
@@ -59,9 +60,6 @@ COLUMNS = ("random", *ALGOS, "rl")
 EXPERT = "expert"
 SEED = 10_000_000
 """Seed of the first recorded episode, far from those of evaluations"""
-DATA = Path(__file__).parents[2] / "docs" / "data"
-"""Folder of the committed rows"""
-ROWS = DATA / "offline.csv"
 FIELDS = (
     *("domain", "tier", "task", "algo", "seed", "success", "return", "episodes"),
     *("steps", "cpu_minutes"),
@@ -213,6 +211,9 @@ def order(row: Row) -> tuple[Any, ...]:
     )
 
 
+BOOK = Book(DATA / "offline.csv", ("domain", "tier", "task", "algo", "seed"), order)
+
+
 def main(
     domain: Annotated[str, typer.Option(help="2d, robosuite, lab or paper.")] = "2d",
     tier: Annotated[str, typer.Option(help="Tier of the datasets of 2d.")] = EXPERT,
@@ -223,26 +224,24 @@ def main(
     folder: Annotated[Path, typer.Option(help="Folder of data and runs.")] = Path(
         "runs/table"
     ),
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
     """Train what has no row yet."""
     chosen = tasks.split(",") if tasks else DOMAINS[domain].tasks
-    key = "domain", "tier", "task", "algo"
-    known = {(*(r[name] for name in key), int(r["seed"])) for r in read(ROWS)}
-    wanted = [
+    book, place = BOOK.at(rows), run_folder(folder, again)
+    cells = [
         (domain, tier, task, algo, seed)
         for seed in range(seeds)
         for algo in algos.split(",")
         for task in chosen
-        if (domain, tier, task, algo, seed) not in known
     ]
+    wanted = book.missing(cells, again)
     learners = {cell[2] for cell in wanted if cell[3] in ALGOS}
     for task in sorted(learners, key=TASKS.index):  # Once, not in each process.
-        DOMAINS[domain].record(task, tier, folder)
-    with ProcessPoolExecutor(jobs) as pool:
-        cells = [pool.submit(train_cell, *cell, folder) for cell in wanted]
-        for cell in as_completed(cells):
-            keep(ROWS, cell.result(), order)
-            print(cell.result(), flush=True)
+        print(f"data of {task}", flush=True)
+        DOMAINS[domain].record(task, tier, place)
+    book.fill(wanted, partial(in_folder, train_cell, place), jobs)
 
 
 if __name__ == "__main__":

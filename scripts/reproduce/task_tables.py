@@ -3,7 +3,8 @@
     python scripts/reproduce/task_tables.py --markdown ideal.md --curves curves.png
     python scripts/reproduce/task_tables.py --profile ur5e --markdown ur5e.md
 
-Means over the seeds there are. "Blind" is the best controller that does not see the
+Means over the seeds there are, which play the same episodes: in an interval these count
+once. "Blind" is the best controller that does not see the
 goal, from ``docs/data/blind.csv``; still, random and sticky are played here. The
 paper's column is the row of Table I for RL in its 2D simulator (arXiv 2405.03113),
 under the paper's own rules and physics.
@@ -18,7 +19,8 @@ import numpy as np
 import typer
 from rich.console import Console
 from rich.table import Table
-from tasks import DATA, EPISODES, THRESHOLDS, Row, Rows, config_of, read
+from rows import DATA, Row, read
+from tasks import EPISODES, THRESHOLDS, Rows, config_of
 
 from marl_airhockey import make_agent
 from marl_airhockey.data.benchmark.catalogue import TASKS
@@ -62,7 +64,7 @@ def success_of(task: str, profile: str, rows: Rows, blind: Rows) -> Row:
     """Return the row of the table of success."""
     mine = of(rows, task, profile)
     rate = np.mean([float(row["success"]) for row in mine])
-    low, high = interval(float(rate), EPISODES * len(mine))
+    low, high = interval(float(rate), EPISODES)
     first = mean(mine, "first_shot")
     key = task, profile
     unaimed = [r for r in blind if (r["task"], r["profile"]) == key]

@@ -7,8 +7,9 @@
 
 Each run that ends adds a row to ``docs/data/tasks.csv`` and its curve to
 ``docs/data/curves.csv``. A run whose row is there is not trained again, unless its
-settings have changed since, so the script can be stopped and started; delete the rows
-after a change of physics or rules. `task_tables.py` prints the tables of these rows.
+settings have changed since, so the script can be stopped and started; ``--again``
+trains all, as after a change of physics or rules, and ``--rows FILE`` keeps the rows
+elsewhere. `task_tables.py` prints the tables of these rows.
 
 Success is that of the last policy (no checkpoint is picked) over the test seeds, which
 training never sees: on the numba backend that it was trained on, on pymunk, with the
@@ -18,15 +19,14 @@ has a profile's physics and servo but observes the true state: what sensing cost
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import hashlib
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
+from rows import DATA, Again, Book, Row, RowsFile, read, run_folder, write
 
 from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.evaluation.evaluate import evaluate
@@ -47,8 +47,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "60hz": {"control_dt": 1 / 60, "gamma": 0.9967, "gae_lambda": 0.983, "n_steps": 96},
 }
 """Settings that replace a preset's, by the name of the variant"""
-DATA = Path(__file__).parents[2] / "docs" / "data"
-"""Folder of the committed rows"""
 KEY = ("task", "profile", "variant", "seed")
 CURVE = {
     "steps": "steps",
@@ -56,7 +54,6 @@ CURVE = {
     "success": "success",
 }
 """Columns of the committed curves, and of a run's ``evaluations.csv``"""
-Row = dict[str, Any]
 Rows = list[Row]
 
 
@@ -88,14 +85,21 @@ def _default(field: dataclasses.Field[Any]) -> Any:
     return field.default if factory is dataclasses.MISSING else factory()
 
 
-def train_seed(config: PPOConfig, variant: str, folder: Path) -> tuple[Row, Rows]:
+def train_seed(
+    folder: Path, task: str, profile: str, variant: str, seed: int, name: str
+) -> tuple[Row, Rows]:
     """Train one seed, measure its last policy; return its row and those of its curve.
 
     Args:
-        config: of the run.
-        variant: name of what it changes.
-        folder: of the run; one that was cut off is gone on with.
+        folder: Folder of all runs; one that was cut off is gone on with.
+        task: Task.
+        profile: Profile.
+        variant: Name of what it changes.
+        seed: Seed.
+        name: Name of its settings, see `recipe`.
     """
+    config = config_of(task, profile, variant, seed)
+    folder /= "-".join(filter(None, (task, profile, variant, str(seed), name)))
     run_training(None if (folder / "config.toml").exists() else config, folder)
     values = config.scenario, config.profile, variant, config.seed
     key = dict(zip(KEY, values, strict=True))
@@ -145,30 +149,19 @@ def measure(config: PPOConfig, folder: Path) -> Row:
     return row
 
 
-def read(path: Path) -> Rows:
-    """Return the rows of a CSV file; none if there is no file."""
-    if not path.exists():
-        return []
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def keep(path: Path, new: Rows) -> None:
-    """Put rows into a CSV file in place of those of the same runs, in order."""
-    runs = {run_of(row) for row in new}
-    rows = [row for row in read(path) if run_of(row) not in runs] + new
-    rows.sort(key=run_of)  # Stable: a curve's points stay in order.
-    draft = path.with_suffix(".part")
-    with draft.open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(new[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    draft.replace(path)
+BOOK = Book(DATA / "tasks.csv", (*KEY, "recipe"))
 
 
 def run_of(row: Row) -> tuple[str, ...]:
     """Return what tells the runs of rows apart."""
     return tuple(str(row[name]) for name in KEY)
+
+
+def keep(path: Path, new: Rows) -> None:
+    """Put rows into a file in place of those of the same runs, in order."""
+    runs = {run_of(row) for row in new}
+    rows = [row for row in read(path) if run_of(row) not in runs] + new
+    write(path, sorted(rows, key=run_of))  # Stable: a curve's points stay in order.
 
 
 def main(
@@ -180,26 +173,21 @@ def main(
     variant: Annotated[str, typer.Option(help="None, truth or 60hz.")] = "",
     jobs: Annotated[int, typer.Option(help="Number of processes.")] = 2,
     out: Annotated[Path, typer.Option(help="Folder of the runs.")] = Path("runs/tasks"),
+    again: Again = False,
+    rows: RowsFile = None,
 ) -> None:
-    """Train tasks and keep their rows."""
-    names, console = tasks.split(","), Console()
-    configs = [config_of(n, profile, variant, s) for s in range(seeds) for n in names]
-    kept = {(*run_of(row), row["recipe"]) for row in read(DATA / "tasks.csv")}
-    DATA.mkdir(exist_ok=True)
-    with ProcessPoolExecutor(jobs, max_tasks_per_child=1) as pool:
-        futures = []
-        for config in configs:
-            run = (config.scenario, profile, variant, str(config.seed))
-            if (*run, recipe(config)) not in kept:
-                folder = out / "-".join([*filter(None, run), recipe(config)])
-                futures.append(pool.submit(train_seed, config, variant, folder))
-        for future in as_completed(futures):
-            if future.exception() is not None:  # Do not wait for all the others.
-                pool.shutdown(cancel_futures=True)
-            row, curve = future.result()
-            keep(DATA / "tasks.csv", [row])
-            keep(DATA / "curves.csv", curve)
-            console.print(row)
+    """Train tasks and keep their rows, and their curves beside them."""
+    book = BOOK.at(rows)
+    runs = [(n, profile, variant, s) for s in range(seeds) for n in tasks.split(",")]
+    cells = [(*run, recipe(config_of(*run))) for run in runs]
+
+    def kept(found: tuple[Row, Rows]) -> None:
+        keep(book.path, [found[0]])
+        curves = "curves.csv" if rows is None else f"{rows.stem}_curves.csv"
+        keep(book.path.with_name(curves), found[1])
+
+    work = partial(train_seed, run_folder(out, again))
+    book.fill(book.missing(cells, again), work, jobs, kept)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import runpy
 from pathlib import Path
 from statistics import mean
@@ -10,6 +11,7 @@ import pytest
 
 from marl_airhockey.devices.rig import LATEST
 from marl_airhockey.devices.robot import MotionLimits
+from marl_airhockey.evaluation.stats import interval
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "docs/data"
@@ -88,6 +90,43 @@ def test_tables_of_tasks_are_the_means_of_their_rows(page, profile, number, titl
             expected = summary(seeds(row["task"], profile, column))
             value = 0.0 if row[title] == "-" else float(row[title])
             assert value == pytest.approx(expected, abs=6e-4), (row, title)
+
+
+@pytest.mark.parametrize(("profile", "number"), [("ideal", 0), ("ur5e", 1)])
+def test_intervals_of_tasks_count_each_episode_once(profile, number):
+    for row in table("docs/tasks.md", "task", "95 % interval", number=number):
+        low, high = interval(mean(seeds(row["task"], profile, "success")), 2000)
+        assert row["95 % interval"] == f"{low:.3f} .. {high:.3f}"
+
+
+def test_the_zoo_is_that_of_its_rows():
+    rows = {row["policy"]: row for row in rows_of("zoo.csv")}
+    shown = table("docs/tasks.md", "task", "`zoo/TASK`, ideal")
+    policies = []
+    for line in shown:
+        task, *cells = line.values()
+        for end, cell in zip(("", "_ur5e", "_full_size"), cells, strict=True):
+            if cell == "-":
+                continue
+            policies.append(f"{task}{end}")
+            success, low, high = (
+                float(rows[policies[-1]][name]) for name in ("success", "low", "high")
+            )
+            assert cell == f"{success:.3f} ({low:.3f} .. {high:.3f})"
+    assert sorted(policies) == sorted(rows)
+
+
+def test_sentences_of_the_readme_are_those_of_the_rows():
+    text = " ".join((ROOT / "README.md").read_text().split())
+    rows = [r for r in rows_of("tasks.csv") if r["profile"] == "ideal"]
+    slowest = max(float(row["cpu_seconds_to_0.95"]) for row in rows)
+    assert f"reaches 0.95 within {math.ceil(slowest)} CPU-seconds" in text
+    arm = {
+        task: mean(seeds(task, "ideal", "arm")) for task in {r["task"] for r in rows}
+    }
+    worst = min(arm, key=arm.get)
+    best = max(arm.values())
+    assert f"success {arm[worst]:.3f} ({worst}) to {best:.3f} in the profile" in text
 
 
 def test_blind_columns_are_those_of_the_search():
