@@ -165,8 +165,12 @@ def host_match(
             plant = stack.enter_context(lab_plant(match.backend.rig.operator))
         session = open_table(match, recorder, plant)
         name = match.world.scenario.name
+        # The virtual lab is the plant that has faults.
+        guarded = plant is not None and not plant.faults
         host_table(
-            lambda access: application(session, access), name, host, port, browser
+            lambda access: application(session, access),
+            *(name, host, port, browser),
+            guarded=guarded,
         )
     if session.failure is not None:
         raise session.failure
@@ -234,6 +238,7 @@ def host_table(
     host: str,
     port: int,
     browser: bool,
+    guarded: bool = False,
 ) -> None:
     """Serve an application until interrupted, after printing its address.
 
@@ -243,11 +248,12 @@ def host_table(
         host: address to listen at.
         port: to listen at; 0 for a free one.
         browser: True to open the page.
+        guarded: See `AccessCheck`.
     """
     from marl_airhockey.play.access import AccessCheck
     from marl_airhockey.play.connections import listen, serve
 
-    access = AccessCheck(host)
+    access = AccessCheck(host, guarded)
     app = make(access)
     server = listen(host, port)
     address = f"http://{_reachable(host)}:{server.getsockname()[1]}/"

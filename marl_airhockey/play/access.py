@@ -11,6 +11,8 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+FORWARDED = ("forwarded", "via", "x-forwarded-for", "x-real-ip")
+"""Headers by which a proxy says that a request is not its own"""
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; "
@@ -36,11 +38,24 @@ class AccessCheck:
 
     Args:
         host: Address that the server listens at.
+        guarded: Whether pages of this machine need the token, too: a real arm moves.
     """
 
-    def __init__(self, host: str) -> None:
+    def __init__(self, host: str, guarded: bool = False) -> None:
         self.local = host in LOOPBACK
-        self.token = "" if self.local else secrets.token_urlsafe(12)
+        needed = guarded or not self.local
+        self.token = secrets.token_urlsafe(12) if needed else ""
+
+    def is_remote(self, request: HTTPConnection) -> bool:
+        """Return True unless a page of this machine itself sends a request.
+
+        Behind a proxy all come from the proxy's address. One that passes the original
+        ``Host``, or any of `FORWARDED`, is known by that.
+        """
+        peer = request.client.host if request.client else ""
+        name = urlsplit(f"//{request.headers.get('host', '')}").hostname
+        forwarded = any(header in request.headers for header in FORWARDED)
+        return forwarded or peer not in LOOPBACK or name not in LOOPBACK
 
     def refusal(self, request: HTTPConnection) -> Response | None:
         """Return the answer to a request that is refused; None to accept it."""

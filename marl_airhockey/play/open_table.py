@@ -202,5 +202,5 @@ class OpenTable(Host):
                 self.match.set_handicap(PRESETS[name])
 
     def _fault(self, client: Client, name: str, on: int) -> None:
-        if name in self.plant.faults:
+        if self.seats.may_control(client) and name in self.plant.faults:
             self.plant.switch(name, bool(on))

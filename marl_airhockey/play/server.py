@@ -16,7 +16,7 @@ from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from marl_airhockey.play.access import LOOPBACK, AccessCheck
+from marl_airhockey.play.access import AccessCheck
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.replay import replay_of
@@ -79,8 +79,7 @@ def application(session: Session, access: AccessCheck) -> Starlette:
             await socket.close(1013, "too many are watching")
             return
         await socket.accept()
-        peer = socket.client.host if socket.client else ""
-        client = session.connect(remote=peer not in LOOPBACK)
+        client = session.connect(remote=access.is_remote(socket))
         writer = asyncio.create_task(_write(socket, session, client))
         try:
             while (message := await socket.receive())["type"] == "websocket.receive":

@@ -53,6 +53,11 @@ class _OnnxModel:
 
     def __call__(self, observation: Any, deterministic: bool) -> Array:
         rows = np.asarray(observation, np.float32)
+        if self.inputs[0].shape[0] == 1:  # Its batch is fixed.
+            return np.concatenate([self._actions(row[None]) for row in rows])
+        return self._actions(rows)
+
+    def _actions(self, rows: Array) -> Array:
         out = np.asarray(self._session.run(None, {self.inputs[0].name: rows})[0])
         if out.shape != (len(rows), 2):
             raise ValueError(
@@ -61,9 +66,31 @@ class _OnnxModel:
             )
         return out
 
+    def check(self) -> None:
+        """Refuse a model that cannot be a policy.
+
+        Raises:
+            ValueError: What it takes or gives is something else; the message says what.
+        """
+        expected = f"{self._source}: expected one input, float32 (B, D)"
+        if len(self.inputs) != 1:
+            raise ValueError(f"{expected}; found {len(self.inputs)} inputs")
+        kind, shape = self.inputs[0].type, self.inputs[0].shape
+        if kind != "tensor(float)" or len(shape) < 2:
+            raise ValueError(f"{expected}; found {kind} of shape {shape}")
+        if isinstance(shape[0], int) and shape[0] != 1:
+            raise ValueError(
+                f"{expected}; its batch is fixed to {shape[0]}: export it with a "
+                "dynamic first axis, or with 1"
+            )
+        if all(isinstance(size, int) for size in shape[1:]):
+            self(np.zeros((2, *shape[1:])), deterministic=True)
+
 
 def load_onnx(path: Path, deterministic: bool) -> Policy:
     """Load an ONNX model with one input, observations (B, D), as a policy.
+
+    One whose batch is fixed to 1 gets a row at a time.
 
     Raises:
         ValueError: Another kind of file or model.
@@ -74,8 +101,7 @@ def load_onnx(path: Path, deterministic: bool) -> Policy:
         model = _OnnxModel(str(path), path.read_bytes())
     except Exception as error:
         raise ValueError(f"{path}: not an ONNX model: {error}") from error
-    if len(model.inputs) != 1:
-        raise ValueError(f"{path}: expected one input, found {len(model.inputs)}")
+    model.check()
     sizes = model.inputs[0].shape[1:]
     shape = tuple(n for n in sizes if isinstance(n, int))
     known = shape if len(shape) == len(sizes) else None

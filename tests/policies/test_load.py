@@ -48,15 +48,20 @@ def test_a_policy_of_a_run_of_another_format_is_refused(sb3_run, tmp_path):
             load_policy(path)
 
 
-def onnx_policy(path, size, outputs):
+def onnx_policy(path, size, outputs, batch="batch", inputs=1, kind=None):
     weight = np.full((size, outputs), 0.01, np.float32)
-    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
+    helper, kind = onnx.helper, kind or onnx.TensorProto.FLOAT
+    types = {onnx.TensorProto.FLOAT: np.float32, onnx.TensorProto.DOUBLE: np.float64}
+    more = [f"memory_{i}" for i in range(1, inputs)]
     graph = helper.make_graph(
         [helper.make_node("MatMul", ["observation", "weight"], ["action"])],
         "policy",
-        [helper.make_tensor_value_info("observation", kind, ["batch", size])],
-        [helper.make_tensor_value_info("action", kind, ["batch", outputs])],
-        [onnx.numpy_helper.from_array(weight, "weight")],
+        [
+            helper.make_tensor_value_info(name, kind, [batch, size])
+            for name in ("observation", *more)
+        ],
+        [helper.make_tensor_value_info("action", kind, [batch, outputs])],
+        [onnx.numpy_helper.from_array(weight.astype(types[kind]), "weight")],
     )
     opset = [helper.make_opsetid("", 17)]
     onnx.save(helper.make_model(graph, opset_imports=opset, ir_version=9), path)
@@ -68,9 +73,33 @@ def test_an_onnx_policy_whose_spaces_fit_drives(tmp_path):
     assert evaluate(driver, "reach", episodes=5).episodes == 5
     with pytest.raises(ValueError, match="expects observations"):
         evaluate(driver, "touch", episodes=2)
-    onnx_policy(tmp_path / "wrong.onnx", 8, 3)
-    with pytest.raises(ValueError, match="expected actions"):
-        evaluate(load_policy(tmp_path / "wrong.onnx"), "reach", episodes=2)
+
+
+def test_an_onnx_policy_of_a_fixed_batch_gets_a_row_at_a_time(tmp_path):
+    onnx_policy(tmp_path / "any.onnx", 8, 2)
+    onnx_policy(tmp_path / "one.onnx", 8, 2, batch=1)
+    every, one = (load_policy(tmp_path / f"{name}.onnx") for name in ("any", "one"))
+    rows = np.random.default_rng(0).normal(size=(5, 8)).astype(np.float32)
+    np.testing.assert_allclose(every.predict(rows, True), one.predict(rows, True))
+    assert evaluate(one, "reach", episodes=3).episodes == 3
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        ({"outputs": 3}, r"expected actions of shape \(2, 2\), got \(2, 3\)"),
+        (
+            {"batch": 64},
+            "its batch is fixed to 64: export it with a dynamic first axis",
+        ),
+        ({"inputs": 2}, r"expected one input, float32 \(B, D\); found 2 inputs"),
+        ({"kind": onnx.TensorProto.DOUBLE}, r"found tensor\(double\) of shape"),
+    ],
+)
+def test_an_onnx_model_that_is_no_policy_is_refused_when_loaded(tmp_path, made, words):
+    onnx_policy(tmp_path / "wrong.onnx", **{"size": 8, "outputs": 2, **made})
+    with pytest.raises(ValueError, match=words):
+        load_policy(tmp_path / "wrong.onnx")
 
 
 def test_a_policy_can_sit_in_any_seat_by_its_path(touch_run):
