@@ -171,6 +171,8 @@ def _named(given: str | Path) -> tuple[str, Any, dict[str, Any]]:
         return code, load_code(code, Driver), _options(tail)
     if path.exists() or path.suffix in (".zip", ".onnx", ".npz"):
         return text, partial(_load_file, path), {}
+    if "/" in text:
+        raise ValueError(f"{text}: there is no such run and no such policy")
     names = [*agent_names(), *plugin_names("drivers")]
     raise ValueError(
         unknown_name("driver", text, names)

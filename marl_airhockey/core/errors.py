@@ -8,7 +8,7 @@ from collections.abc import Iterable
 
 MOST = 8
 """Largest number of known names that a message lists"""
-LIKE = 0.6
+LIKE = 0.7
 """Likeness from which one name is nearly another"""
 
 

@@ -108,6 +108,11 @@ def extract(path: Path, rig: Rig | None = None) -> Trajectories:
         unseen = np.full(2, np.nan)
         place = pucks[0].place if len(pucks) == 1 else unseen
         rows.append((frame.taken, place, paddles.place if paddles else unseen))
+    if not any(np.isfinite([*row[1], *row[2]]).any() for row in rows):
+        raise ValueError(
+            f"{path}: no picture shows a puck or a paddle; is it a video of the rig's "
+            "table, in the light of its calibration?"
+        )
     if several > SEVERAL * len(rows):
         raise ValueError(
             f"{path}: {several} of {len(rows)} pictures show two pucks; film one"

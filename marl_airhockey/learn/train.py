@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import platform
+import shutil
 import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -108,8 +109,8 @@ def run_training(
         The last row of ``evaluations.csv``.
 
     Raises:
-        ValueError: a folder that holds another run, no run to resume, or one that was
-            begun by an older version.
+        ValueError: a folder that holds another run or other things, no run to resume,
+            or one that was begun by an older version.
         RuntimeError: a missing extra, with the line that installs it.
     """
     if config is None:
@@ -118,10 +119,11 @@ def run_training(
         raise ValueError(
             f"{folder} holds a run already: --resume it, or say another --out"
         )
+    elif folder.exists() and any(folder.iterdir()):
+        raise ValueError(f"{folder} holds other things: say another folder, --out")
     resume = _continuation(config, folder, report)
     if (folder / "config.toml").exists():
         return resume()
-    before = set(folder.rglob("*"))
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "config.toml").write_text(config.to_toml())
     for named in (config.scenario, *config.drivers.values()):
@@ -132,7 +134,7 @@ def run_training(
     except BaseException:
         # A run that fails to start leaves nothing behind that it has made.
         if not (folder / "state.json").exists():
-            _remove(folder, before)
+            shutil.rmtree(folder)
         raise
 
 
@@ -172,15 +174,6 @@ def _go_on(
     engine: Callable[[TrainingRun[Config]], Metrics], run: TrainingRun[Config]
 ) -> Metrics:
     return engine(run) if run.steps_left > 0 else run.latest
-
-
-def _remove(folder: Path, kept: set[Path]) -> None:
-    """Remove what is in a folder but was not before, and the folder if it is empty."""
-    for path in sorted(folder.rglob("*"), reverse=True):
-        if path not in kept:
-            path.rmdir() if path.is_dir() else path.unlink()
-    if not any(folder.iterdir()):
-        folder.rmdir()
 
 
 Engine = Callable[[TrainingRun[PPOConfig]], Metrics]

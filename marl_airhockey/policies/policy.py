@@ -58,10 +58,12 @@ class Policy(Driver):
         else:
             shape = observation.shape[1:]
         if self.shape not in (None, shape):
+            scenario = self.trained_in.get("scenario")
+            where = f"it was trained on {scenario}; " if scenario else ""
             raise ValueError(
                 f"{self.source}: it expects observations of shape {self.shape}, "
-                f"this environment gives {shape}; it was trained on another "
-                "scenario, or with other options (observe, goals, reaction, seats)"
+                f"this environment gives {shape}; {where}check the scenario and its "
+                "options (observe, goals, reaction, seats)"
             )
 
     def _actions(self, observation: Any) -> Array:

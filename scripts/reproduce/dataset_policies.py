@@ -48,7 +48,7 @@ def success_of(path: Path, task: str, sampled: bool) -> float:
 
 def until(goal: float, folder: Path, task: str) -> Callable[[int, int, Metrics], None]:
     """Return a function that keeps each evaluated policy, and stops at a success."""
-    kept = folder / "snapshots"
+    kept = folder.with_name(f"{folder.name}-snapshots")
     kept.mkdir(parents=True, exist_ok=True)
     seen = set[float]()
 
@@ -75,7 +75,7 @@ def train_task(task: str, folder: Path) -> dict[str, float]:
     )
     with suppress(EnoughError):
         run_training(config, folder, until(HALF * expert, folder, task))
-    paths = sorted((folder / "snapshots").iterdir())
+    paths = sorted(folder.with_name(f"{folder.name}-snapshots").iterdir())
     near = sorted(
         paths[-4:], key=lambda p: abs(success_of(p, task, True) - HALF * expert)
     )
@@ -99,7 +99,8 @@ def main(
         if snapshot(task, "medium").exists() and not again:
             print(f"{task}: its policies are there; --again trains them")
             continue
-        shutil.rmtree(out / task, ignore_errors=True)
+        for place in (out / task, out / f"{task}-snapshots"):
+            shutil.rmtree(place, ignore_errors=True)
         found = train_task(task, out / task)
         print(task, {level: round(x, 3) for level, x in found.items()}, flush=True)
 

@@ -77,8 +77,14 @@ def test_demo_makes_what_it_says(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("list", "jugle"), "unknown scenario or profile 'jugle'"),
-        (("evaluate", "strker", "-s", "juggle"), "unknown driver 'strker'"),
+        (("list", "jugle"), "profile 'jugle' (did you mean 'juggle'?)"),
+        (("evaluate", "strker", "-s", "juggle"), "(did you mean 'striker'?)"),
+        (("evaluate", "runs/none"), "runs/none: there is no such run"),
+        (("evaluate", "zoo/hit_goal", "-s", "juggle"), "it was trained on hit_goal"),
+        (("evaluate", "zoo/nobody"), "unknown policy of the zoo 'zoo/nobody'; there"),
+        (("evaluate", "still", "-s", "juggle", "--option", "lft=3"), "mean 'lift'?"),
+        (("evaluate", "still", "-s", "juggle", "--physics", "tlt=3"), "mean 'tilt'?"),
+        (("fit-table", "none.csv"), "none.csv: there is no such file"),
         (("evaluate", "x.zip", "-s", "juggle"), "no such policy file"),
         (("train", "jugle"), "unknown scenario"),
         (("train", "juggle", "--set", "gama=1"), "unknown setting 'gama'"),

@@ -84,6 +84,13 @@ def test_a_finished_run_is_not_overwritten(touch_run):
     assert int(run_training(None, touch_run)["steps"]) == int(steps)
 
 
+def test_a_folder_with_other_things_is_refused_and_kept(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ValueError, match="holds other things: say another folder"):
+        ah.train("touch", tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
 @pytest.mark.parametrize(
     "engine", ["torch", pytest.param("sb3", marks=pytest.mark.slow)]
 )
@@ -128,11 +135,6 @@ def test_a_run_that_fails_to_start_leaves_no_folder(tmp_path):
     with pytest.raises(ValueError, match="unknown driver"):
         ah.train("duel", folder, rivals=["nobody"], total_steps=1000)
     assert not folder.exists()
-    folder.mkdir(parents=True)
-    (folder / "notes.txt").write_text("mine")
-    with pytest.raises(ValueError, match="unknown driver"):
-        ah.train("duel", folder, drivers={"paddle_1": "nobody"}, total_steps=1000)
-    assert [path.name for path in folder.iterdir()] == ["notes.txt"]
 
 
 def test_weights_of_a_torch_run_hold_no_code(touch_run, tmp_path):

@@ -165,7 +165,7 @@ def test_broken_and_disguised_arrays_are_refused(tmp_path):
 def test_names_cannot_say_that_they_are_trusted(trap):
     path, sprung = trap
     for name in (f"{path}:trust=yes", f"zoo/juggle:path={path}", str(path)):
-        with pytest.raises(ValueError, match=r"unknown|pickled Python"):
+        with pytest.raises(ValueError, match=r"unknown|no such run|pickled Python"):
             make_agent(name)
     with pytest.raises(ValueError, match=r"unknown option .*'trust'"):
         make_agent(path, trust=True)

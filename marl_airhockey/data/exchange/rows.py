@@ -93,6 +93,8 @@ def read_rows(file: Path) -> Array:
                     "t,x,y, optionally with paddle_x,paddle_y"
                 )
             rows = [_row(file, reader.line_num, header, cells) for cells in reader]
+    except FileNotFoundError as error:
+        raise ValueError(f"{file}: there is no such file") from error
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: cannot be read: {error}") from error
     found = np.array(rows).reshape(-1, 5)
