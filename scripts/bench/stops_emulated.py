@@ -137,16 +137,23 @@ def try_faults(names: tuple[str, ...], rng: np.random.Generator) -> tuple[float,
 
 
 def measure(names: tuple[str, ...], trials: int) -> dict[str, object]:
-    """Return medians and worst values of some trials."""
+    """Return medians and worst values of some trials; None where there are none."""
+
+    def number(x: float) -> float | None:
+        return None if np.isnan(x) else round(float(x), 4)
+
     rng = np.random.default_rng([len(names), *(map(ord, "".join(names)))])
     rows = np.array([try_faults(names, rng) for _ in range(trials)])
-    median, worst = np.median(rows, 0), rows.max(0)
+    known = [column[~np.isnan(column)] for column in rows.T]
+    median = [np.median(column) if len(column) else np.nan for column in known]
+    worst = [column.max() if len(column) else np.nan for column in known]
     columns = ("begins_s", "rest_s", "joint_rad_s2", "tool_m_s2")
     return {
         "faults": " + ".join(names),
         "trials": trials,
+        "come_to_rest": len(known[1]),
         **{
-            name: {"median": round(float(m), 4), "worst": round(float(w), 4)}
+            name: {"median": number(m), "worst": number(w)}
             for name, m, w in zip(columns, median, worst, strict=True)
         },
     }
@@ -163,7 +170,7 @@ def show(row: dict[str, object]) -> None:
     ):
         pair = row[name]
         assert isinstance(pair, dict)
-        values = [form.format(scale * pair[key]) for key in ("median", "worst")]
+        values = [form.format(scale * x) for x in pair.values() if x is not None]
         cells.append(" / ".join(values))
     print(f"| {row['faults']} | " + " | ".join(cells) + " |", flush=True)
 

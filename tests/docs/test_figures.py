@@ -271,11 +271,41 @@ def test_stops_are_those_of_their_rows(name):
         case = next(iter(shown.values())).strip("`")
         for title, (column, scale, digits) in STOPS[name].items():
             if case == "worst of all pairs":
-                known = [max(row[column]["worst"] for row in pairs)]
+                worst = [row[column]["worst"] for row in pairs]
+                known = [max(x for x in worst if x is not None)]
             else:
                 known = [x for x in found[case][column].values() if x is not None]
             expected = " / ".join(f"{scale * x:.{digits}f}" for x in known)
             assert shown[title] == expected, (case, title)
+
+
+def test_every_trial_of_a_stop_comes_to_rest():
+    rows = json.loads((DATA / "stops_emulated.json").read_text())
+    for row in rows:
+        # A caller goes on where somebody only turned the slider down.
+        expected = 0 if row["faults"] == "speed_slider" else row["trials"]
+        assert row["come_to_rest"] == expected, row["faults"]
+
+
+def test_the_long_run_is_that_of_its_row():
+    row = json.loads((DATA / "soak.json").read_text())
+    changes = row["changes"].items()
+    stops, holds = (
+        sum(count for name, count in changes if name.startswith(kind))
+        for kind in ("FAULT", "HOLD")
+    )
+    (shown,) = table("docs/robot.md", "emulated hours", "leaps")
+    assert list(shown.values()) == [
+        f"{row['hours']:g}",
+        f"{row['cycles']:,}",
+        f"{row['faults']:,}",
+        f"{stops} / {holds}",
+        f"{row['longest_cycle_cpu_ms']:.1f}",
+        f"{row['top_speed']:.3f}",
+        f"{row['leaps']}",
+        f"{row['outside_mm']:.1f} / {row['below_table_mm']:.1f}",
+    ]
+    assert row["leaps"] == 0
 
 
 def test_faults_of_the_lab_are_those_of_their_rows():
