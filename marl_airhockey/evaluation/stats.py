@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,38 @@ def bootstrap(
     ]
     low, high = np.quantile(found, [0.025, 0.975])
     return float(low), float(high)
+
+
+def bounded_mean(
+    groups: Sequence[Sequence[float]], bounds: tuple[float, float], seed: int = 0
+) -> list[float]:
+    """Return a mean of bounded values in groups with a 95 % interval inside the bounds.
+
+    The interval is of a bootstrap over the groups, with percentiles that are expanded
+    for few of them (Hesterberg, 2015); nan for fewer than `FEWEST_GROUPS`.
+    If all groups have the same mean, it is that of a share (Wilson, 1927).
+
+    Args:
+        groups: Values, in groups that are independent of each other, such as people.
+        bounds: Least and largest possible value.
+        seed: Seed of the drawing.
+    """
+    chosen = [np.asarray(group, float) for group in groups if len(group)]
+    if not chosen:
+        return [np.nan] * 3
+    sums = np.array([group.sum() for group in chosen])
+    counts, n = np.array([len(group) for group in chosen]), len(chosen)
+    mean = float(sums.sum() / counts.sum())
+    if n < FEWEST_GROUPS:
+        return [mean, np.nan, np.nan]
+    if np.ptp(sums / counts) == 0.0:
+        low, high = bounds
+        ends = interval((mean - low) / (high - low), n)
+        return [mean, *(low + (high - low) * end for end in ends)]
+    drawn = np.random.default_rng(seed).integers(0, n, (RESAMPLES, n))
+    means = sums[drawn].sum(1) / counts[drawn].sum(1)
+    tail = NormalDist().cdf(-student_t(n - 1) * np.sqrt(n / (n - 1)))
+    return [mean, *(float(x) for x in np.quantile(means, [tail, 1.0 - tail]))]
 
 
 def student_t(degrees: int) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -12,66 +13,58 @@ from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.play.measures import Player
 from marl_airhockey.play.report import Report
 
-MOST = 4
-"""Largest number of players whose distributions are drawn."""
-LINE = 0.2
-"""Height of a player's line in the panel of scores, inches."""
+LINE = 0.34
+"""Height of a player's line, inches"""
+NAME = 26
+"""Largest number of characters in a line of a player's name"""
+PANELS = (
+    ("delays", "round trip of the page, ms"),
+    ("shot_speeds", "speed of shots, m/s"),
+    ("shot_placements", "offset at which shots\nwould arrive, m"),
+)
+"""Fields of `Player` that are drawn, and what they are"""
 
 
 def plot_report(report: Report, path: Path) -> None:
-    """Write a PNG of scores, round trips, speed and placement of shots."""
-    ranked = sorted(report.players.values(), key=lambda p: (not p.person, -p.games))
-    shown = list(zip(ranked, (INK, *INKS), strict=False))[:MOST]
-    scored = sum(bool(row["games"]) for row in report.rows())
-    heights = max(3.0, LINE * scored), 3.0
+    """Write a PNG with a line for each player.
+
+    It shows the score with its 95 % interval, and medians and quartiles of round trips,
+    speeds and placements of shots.
+    """
+    rows = report.rows()[::-1]
+    players = [report.players[row["player"]] for row in rows]
     figure, grid = plt.subplots(
-        *(2, 2),
-        figsize=(9, sum(heights)),
-        height_ratios=heights,
+        *(1, 1 + len(PANELS)),
+        figsize=(11, LINE * len(rows) + 1.3),
         dpi=DPI,
         layout="constrained",
+        sharey=True,
     )
-    _scores(grid[0, 0], report)
-    panels = (
-        (grid[0, 1], "delays", "round trip of the page, ms"),
-        (grid[1, 0], "shot_speeds", "speed of shots, m/s"),
-        (grid[1, 1], "shot_placements", "offset at which shots would arrive, m"),
-    )
-    for axes, name, label in panels:
-        _distributions(axes, name, label, shown)
+    for k, (row, player) in enumerate(zip(rows, players, strict=True)):
+        if player.games:
+            _line(grid[0], k, player, *row["score"])
+        for axes, (name, _) in zip(grid[1:], PANELS, strict=True):
+            values = getattr(player, name)
+            if len(values):
+                low, middle, high = np.quantile(values, (0.25, 0.5, 0.75))
+                _line(axes, k, player, middle, low, high)
+    names = [textwrap.fill(row["player"], NAME) for row in rows]
+    grid[0].set_yticks(range(len(rows)), names)
+    grid[0].axvline(0.5, color=INKS[0], linestyle=":", linewidth=1)
+    grid[0].set(xlim=(-0.02, 1.02), xlabel="score: win + draw / 2\n(95 % interval)")
+    for axes, (name, label) in zip(grid[1:], PANELS, strict=True):
+        axes.set_xlabel(f"{label}\n(median, quartiles)")
+        if not any(len(getattr(player, name)) for player in players):
+            axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
+    for axes in grid:
+        tidy(axes, legend=None)
     save(figure, path)
 
 
-def _scores(axes: Axes, report: Report) -> None:
-    """Draw each player's score with its interval."""
-    rows = [row for row in report.rows() if row["games"]][::-1]
-    for k, row in enumerate(rows):
-        middle, low, high = row["score"]
-        ink = INK if row["person"] else INKS[0]
-        axes.plot([low, high], [k, k], color=ink, linewidth=2)
-        axes.plot(middle, k, "o", color=ink)
-    axes.set_yticks(range(len(rows)), [row["player"] for row in rows])
-    axes.axvline(0.5, color=INKS[0], linestyle=":", linewidth=1)
-    axes.set(xlim=(-0.02, 1.02), xlabel="score: win + draw / 2 (95 %)")
-    tidy(axes, legend=None)
-
-
-def _distributions(
-    axes: Axes,
-    name: str,
-    label: str,
-    players: list[tuple[Player, str]],
+def _line(
+    axes: Axes, k: int, player: Player, middle: float, low: float, high: float
 ) -> None:
-    """Draw the cumulative distributions of a field of `Player`."""
-    drawn = False
-    for player, ink in players:
-        values = np.sort(getattr(player, name))
-        if len(values) < 2:
-            continue
-        share = (np.arange(len(values)) + 0.5) / len(values)
-        axes.plot(values, share, color=ink, label=f"{player.name} ({len(values)})")
-        drawn = True
-    axes.set(xlabel=label, ylabel="share at most this", ylim=(0, 1))
-    if not drawn:
-        axes.text(0.5, 0.5, "seen too seldom", transform=axes.transAxes, ha="center")
-    tidy(axes, "best" if drawn else None)
+    """Draw a value and its range in the line of a player."""
+    ink = INK if player.person else INKS[0]
+    axes.plot([low, high], [k, k], color=ink, linewidth=2)
+    axes.plot(middle, k, "o", color=ink)

@@ -94,6 +94,8 @@ def _games_of(diary: Diary) -> Iterator[dict[str, Any]]:
             begun = None
         if row["kind"] == "begin":
             begun = row
+        elif row["kind"] == "recording" and begun is not None:
+            begun = {**begun, "recording": row["recording"]}
         elif row["kind"] == "game":
             yield row
     if begun is not None:

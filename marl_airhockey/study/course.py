@@ -25,6 +25,7 @@ class Course:
         self.plan, self.diary = plan, diary
         self.stage = "ready"
         """One of: ready, match, over, questions, rest, end."""
+        self._recording = ""
         self.time_left = 0.0
         """Rest of a break, or of the time for which a result is shown, s."""
         self.block = 0
@@ -73,7 +74,13 @@ class Course:
     def begin(self) -> None:
         """Begin the next game of the block."""
         self.diary.write("begin", **self.position)
-        self.stage = "match"
+        self.stage, self._recording = "match", ""
+
+    def note_recording(self, name: str) -> None:
+        """Note the recording of the game that runs, which a crash may cut off."""
+        if name != self._recording:
+            self._recording = name
+            self.diary.write("recording", recording=name)
 
     def end_game(self, result: str, **facts: Any) -> None:
         """Note a game in the diary; one that was broken off is played again."""

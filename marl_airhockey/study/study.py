@@ -116,6 +116,9 @@ class Study(Host):
         if self.people.participant is None:
             return
         course = self.people.participant.course
+        recorder = self.recorder
+        if course.stage == "match" and recorder and recorder.runs and recorder.path:
+            course.note_recording(recorder.path.name)
         if course.stage == "match" and over:
             self._end_game(course)
         else:

@@ -8,11 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from marl_airhockey.evaluation.stats import FEWEST_GROUPS
+from marl_airhockey.evaluation.stats import FEWEST_GROUPS, bounded_mean
 from marl_airhockey.play.cells import markdown, shown, write_csv
-from marl_airhockey.play.report import middle, share
+from marl_airhockey.play.report import share
 from marl_airhockey.study.answers import ANSWERS, GAMES, MEASURES, POINTS, Answers
 from marl_airhockey.study.archive import TABLES
 from marl_airhockey.study.plan import SCALE_POINTS
@@ -49,7 +47,7 @@ def by_question(found: Answers) -> list[Row]:
             name = f"{question}: {choice}"
             rows.append({"question": name, **group, "scale": 1, "mean": share(chose)})
         if not chosen[0]["choice"]:
-            mean = middle(_groups(chosen, _value), np.mean)
+            mean = bounded_mean(_groups(chosen, _value), (1.0, SCALE_POINTS))
             scale = {"scale": SCALE_POINTS, "mean": mean}
             rows.append({"question": question, **group, **scale})
     return rows

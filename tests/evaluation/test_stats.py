@@ -7,6 +7,7 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.evaluation.stats import (
     bootstrap,
+    bounded_mean,
     elo,
     iqm,
     probability_of_improvement,
@@ -47,6 +48,33 @@ def test_runs_are_summed_up_over_runs_and_over_episodes():
     assert (low, high) == pytest.approx((min(success), max(success)))
     assert low < found.over_episodes[0] < found.over_episodes[1] < high
     assert "success of 3 runs: " in found.text
+
+
+def test_intervals_of_bounded_answers_stay_inside_the_scale():
+    rng = np.random.default_rng(0)
+    for n in (5, 8, 24):
+        for _ in range(50):
+            groups = rng.choice([1.0, 6.0, 7.0], (n, 2), p=[0.1, 0.2, 0.7]).tolist()
+            mean, low, high = bounded_mean(groups, (1.0, 7.0))
+            assert 1.0 <= low <= mean <= high <= 7.0
+            assert mean == pytest.approx(np.mean(groups))
+    assert bounded_mean([[2.0]] * 4, (1.0, 7.0))[0] == 2.0
+    assert np.isnan(bounded_mean([[2.0]] * 4, (1.0, 7.0))[1:]).all()
+    mean, low, high = bounded_mean([[7.0]] * 8, (1.0, 7.0))
+    assert (mean, high) == (7.0, 7.0)
+    assert 4.0 < low < 6.0
+
+
+@pytest.mark.parametrize(("n", "least"), [(6, 0.9), (24, 0.93)])
+def test_intervals_of_bounded_answers_contain_the_mean(n, least):
+    rng, hits = np.random.default_rng(1), 0
+    chances = np.array([0.05, 0.1, 0.15, 0.2, 0.2, 0.2, 0.1])
+    truth = float(chances @ np.arange(1, 8))
+    for seed in range(400):
+        groups = rng.choice(np.arange(1.0, 8.0), (n, 1), p=chances)
+        _, low, high = bounded_mean(groups.tolist(), (1.0, 7.0), seed)
+        hits += low <= truth <= high
+    assert least <= hits / 400 <= 0.98
 
 
 def test_json_has_no_nan():

@@ -108,6 +108,10 @@ def recount(out, report):
     assert len(counted) == PEOPLE * 6
     results = Counter(row["result"] for row in found.games)
     assert results["cut off"] == len(CRASHES)
+    for row in found.games:
+        if row["result"] == "cut off":
+            (path,) = out.glob(f"*/{row['recording']}")
+            assert read_head(path)["study"]["opponent"] == row["opponent"]
     orders = defaultdict(set)
     for row in counted:
         orders[row["opponent"], row["block"]].add(row["participant"])

@@ -69,6 +69,12 @@ def folder(tmp_path_factory):
     return out
 
 
+def test_a_game_that_was_cut_off_names_its_recording(folder):
+    rows = [g for g in read_answers(folder).games if g["result"] == "cut off"]
+    assert len(rows) == 1
+    assert len(list(folder.glob(f"*/{rows[0]['recording']}"))) == 1
+
+
 def test_an_opponent_has_one_name_everywhere(folder):
     label = "=slow | steady"
     found = read_answers(folder)
