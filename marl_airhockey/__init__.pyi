@@ -2,6 +2,7 @@
 
 import types
 
+from .evaluation.crossplay import crossplay as crossplay
 from .evaluation.evaluate import evaluate as evaluate
 from .evaluation.league import league as league
 from .learn.train import train as train

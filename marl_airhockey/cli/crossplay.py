@@ -20,7 +20,8 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.evaluation.crossplay import CrossPlay, play_together
+from marl_airhockey.evaluation.crossplay import CrossPlay
+from marl_airhockey.evaluation.crossplay import crossplay as play_crossplay
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 
@@ -43,10 +44,14 @@ def crossplay(
     _, keywords, mates = as_trained_unless_given(mates, scenario, keywords, as_json)
     with bar() as progress:
         task = progress.add_task("pairs", total=len(mates) ** 2, note="")
-        found = play_together(
-            *(scenario, mates, episodes, seed),
-            keywords=keywords,
+        found = play_crossplay(
+            scenario,
+            mates,
+            episodes=episodes,
+            seed=seed,
+            exact=True,
             report=lambda pairs: progress.update(task, completed=pairs),
+            **keywords,
         )
     if as_json:
         console.print_json(json.dumps(found.to_json()))

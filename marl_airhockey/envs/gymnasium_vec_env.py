@@ -20,10 +20,10 @@ from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.pictures import Pictures
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.seats import check_one_open
-from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.observer import Observation
+from marl_airhockey.world.spaces import action_space, observation_space
 from marl_airhockey.world.step_result import StepResult
 
 

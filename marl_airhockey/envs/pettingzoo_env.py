@@ -13,13 +13,12 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.state import State
 from marl_airhockey.envs.attributes import CheckedAttributes
-from marl_airhockey.envs.global_state import GlobalState
 from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.seats import check_some_open
-from marl_airhockey.envs.spaces import action_space, observation_space
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.spaces import action_space, observation_space
 from marl_airhockey.world.step_result import StepResult
 
 Dicts = tuple[
@@ -89,8 +88,7 @@ class AirHockeyEnv(CheckedAttributes, ParallelEnv[str, Any, Any]):  # type: igno
         self._action_spaces = {agent: action_space() for agent in self.possible_agents}
         self.observation_spaces = self._observation_spaces
         self.action_spaces = self._action_spaces
-        self._global_state = GlobalState(self.world)
-        self.state_space = self._global_state.space
+        self.state_space = self.world.critic_state_space
         self.np_random = np.random.default_rng()
 
     @property
@@ -142,7 +140,7 @@ class AirHockeyEnv(CheckedAttributes, ParallelEnv[str, Any, Any]):  # type: igno
     @property
     def state_labels(self) -> tuple[str, ...]:
         """Name of each element of `state`."""
-        return self._global_state.labels
+        return self.world.critic_state_labels
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -276,7 +274,7 @@ class AirHockeyEnv(CheckedAttributes, ParallelEnv[str, Any, Any]):  # type: igno
         """
         if not self.world.episode.number[0]:
             raise RuntimeError("state: call reset() first; no episode is running")
-        return np.asarray(self._global_state.read()[0])
+        return np.asarray(self.world.critic_state()[0])
 
     def render(self) -> Array | None:
         """Return a picture (H, W, 3) uint8 for "rgb_array"; None for "human"."""

@@ -12,11 +12,10 @@ from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.envs.global_state import GlobalState
-from marl_airhockey.envs.spaces import observation_space
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.observer import Observation
+from marl_airhockey.world.spaces import observation_space
 
 
 class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
@@ -61,7 +60,6 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
             for group, mine in rows.items()
         }
         """Names of the agents of each group."""
-        self._global_state = GlobalState(self.world)
         self._make_specs()
 
     def _make_specs(self) -> None:
@@ -72,7 +70,7 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
                 'take another observe=, and goals="flat"'
             )
         batch, device = tuple(self.batch_size), self.device
-        whole = self._global_state.space
+        whole = self.world.critic_state_space
         low, high = torch.as_tensor(whole.low), torch.as_tensor(whole.high)
         observation: dict[str, Any] = {
             "state": Bounded(
@@ -106,7 +104,7 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
     @property
     def state_labels(self) -> tuple[str, ...]:
         """Name of each element of ``state``."""
-        return self._global_state.labels
+        return self.world.critic_state_labels
 
     def _set_seed(self, seed: int | None) -> None:
         self.world.seed(seed)
@@ -149,7 +147,7 @@ class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]
             for group, mine in self._rows.items()
         }
         whole = {
-            "state": self._tensor(self._global_state.read()),
+            "state": self._tensor(self.world.critic_state()),
             "done": ended | out_of_time,
             "terminated": ended,
             "truncated": out_of_time,

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.evaluation.as_trained import as_trained, seen_in
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.stats import bootstrap
+from marl_airhockey.registry import make_agent
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 
@@ -72,40 +73,52 @@ class CrossPlay:
         }
 
 
-def play_together(
+def crossplay(
     scenario: str,
-    players: Mapping[str, Driver],
+    players: Mapping[str, object] | Sequence[str],
+    *,
     episodes: int = 200,
     seed: int = TEST_SEED,
-    keywords: Keywords | None = None,
+    exact: bool = False,
     report: Callable[[int], None] = lambda pairs: None,
+    **keywords: Unpack[Keywords],
 ) -> CrossPlay:
     """Let every player play with every other as its mate, and with itself.
 
+    What is not given is that of the policies' training, which must agree.
+
     Args:
-        scenario: name of a game whose first team has two seats or more.
-        players: drivers by name, two at least.
-        episodes: number of episodes of each pair, with the same seeds for all.
-        seed: seed of the first one.
-        keywords: keywords of the environment; its drivers fill other teams' seats.
-        report: called after each pair with their number so far.
+        scenario: Name of a game whose first team has two seats or more.
+        players: Players by name, see `registry.make_agent`, two at least; or their
+            names alone.
+        episodes: Number of episodes of each pair, with the same seeds for all.
+        seed: Seed of the first one.
+        exact: Whether keywords that are not given have their defaults instead.
+        report: Function that is called after each pair with their number so far.
+        **keywords: Keywords of the environment; its drivers fill other teams' seats.
 
     Raises:
-        ValueError: a single player, a team of one, or a seat without a driver.
+        ValueError: A single player, a team of one, or a seat without a driver.
     """
-    keywords = keywords if keywords is not None else {}
-    if len(players) < 2:
+    if isinstance(players, str):
+        raise ValueError(f"players: a list of names is expected, got {players!r}")
+    named = players if isinstance(players, Mapping) else {n: n for n in players}
+    drivers = {name: make_agent(player) for name, player in named.items()}
+    if not exact:
+        _, keywords = as_trained(drivers, scenario, keywords)
+        drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
+    if len(drivers) < 2:
         raise ValueError("cross-play needs at least two players, of different names")
     seats = scenario_of(scenario, keywords).scene.seats
     mates = [i for i, s in enumerate(seats) if i and s.team == seats[0].team]
     if not mates:
         raise ValueError(f"{scenario!r} has no team of two seats or more")
-    returns, success = np.empty((2, len(players), len(players)))
-    for i, (name, player) in enumerate(players.items()):
-        for j, mate in enumerate(players.values()):
+    count, others = len(drivers), keywords.get("drivers", {})
+    returns, success = np.empty((2, count, count))
+    for i, (name, player) in enumerate(drivers.items()):
+        for j, mate in enumerate(drivers.values()):
             team = {f"paddle_{k}": mate for k in mates}
-            drivers = {**keywords.get("drivers", {}), **team}
-            seated: Keywords = {**keywords, "drivers": drivers}
+            seated: Keywords = {**keywords, "drivers": {**others, **team}}
             found = evaluate(
                 player,
                 scenario,
@@ -116,5 +129,5 @@ def play_together(
                 **seated,
             )
             returns[i, j], success[i, j] = found.returns, found.success
-            report(i * len(players) + j + 1)
-    return CrossPlay(scenario, tuple(players), episodes, returns, success)
+            report(i * count + j + 1)
+    return CrossPlay(scenario, tuple(drivers), episodes, returns, success)

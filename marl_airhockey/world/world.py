@@ -40,13 +40,14 @@ from marl_airhockey.world.placement import check_placement
 from marl_airhockey.world.referee import Referee
 from marl_airhockey.world.sensed_memory import SensedMemory
 from marl_airhockey.world.set_state import checked_memory, checked_worlds, settled
+from marl_airhockey.world.spaces import WorldSpaces
 from marl_airhockey.world.step_result import StepResult
 
 NOWHERE = np.zeros(0, np.int64)
 """Indices of no worlds."""
 
 
-class World:
+class World(WorldSpaces):
     """B worlds of one scenario on one backend.
 
     Worlds can be copied and pickled at any moment; the copy is independent.

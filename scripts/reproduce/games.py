@@ -25,7 +25,7 @@ from rich.table import Table
 from marl_airhockey.cli.league import SCRIPTS
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.charts import DPI, INK, INKS, plot_iqm, save, tidy
-from marl_airhockey.evaluation.crossplay import play_together
+from marl_airhockey.evaluation.crossplay import crossplay
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.learn.ppo_config import preset
@@ -86,8 +86,12 @@ def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
     table = Table("pair", "return", "success")
     players: dict[str, Driver] = {str(f): load_policy(f / "last.npz") for f in folders}
     scripts = {name: make_agent(name) for name in ("striker", "allround")}
-    learned = play_together(game, players, GAMES, SEED, ON_NUMBA)
-    scripted = play_together(game, scripts, GAMES, SEED, ON_NUMBA)
+    learned = crossplay(
+        game, players, episodes=GAMES, seed=SEED, exact=True, **ON_NUMBA
+    )
+    scripted = crossplay(
+        game, scripts, episodes=GAMES, seed=SEED, exact=True, **ON_NUMBA
+    )
     same = np.eye(len(players), dtype=bool)
     rows = {
         "of one seed": (learned.returns[same], learned.success[same]),

@@ -18,6 +18,24 @@ def test_supersuit_shares_one_policy():
 
 
 @pytest.mark.slow
+def test_the_first_hour_makes_what_it_says(tmp_path):
+    out = run("tutorials/first_hour.py", "--out", str(tmp_path / "tour"))
+    assert {path.name for path in (tmp_path / "tour").iterdir()} == {
+        *("touch", "recording", "touch.gif")
+    }
+    assert float(re.search(r"numba: success ([\d.]+)", out)[1]) > 0.9
+    assert float(re.search(r"zoo/juggle +success ([\d.]+)", out)[1]) > 0.9
+
+
+@pytest.mark.slow
+def test_mappo_in_one_file_learns_to_rally():
+    out = run("tutorials/mappo.py", "--updates", "60")
+    rewards = [float(x) for x in re.findall(r"reward of a step (-?[\d.]+)", out)]
+    assert rewards[-1] > 1.5 * rewards[0] > 0.0
+    assert float(re.search(r"return ([\d.]+), success", out)[1]) > 6.0
+
+
+@pytest.mark.slow
 def test_torchrl_trains_with_the_state():
     out = run("tutorials/with_torchrl.py", "--updates", "2", "--frames", "1000")
     assert out.count("crossings an episode") == 2

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from marl_airhockey.evaluation.crossplay import CrossPlay, play_together
+import marl_airhockey as ah
+from marl_airhockey.evaluation.crossplay import CrossPlay
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import make_agent
 
 SHORT = {"options": {"seconds": 8.0}}
-
-
-def players(*names):
-    return {name: make_agent(name) for name in names}
 
 
 def test_the_gap_is_what_players_lose_with_others():
@@ -27,7 +24,7 @@ def test_the_gap_is_what_players_lose_with_others():
 
 
 def test_every_player_meets_every_other_in_both_roles():
-    found = play_together("rally", players("allround", "still"), 8, 3, SHORT)
+    found = ah.crossplay("rally", ["allround", "still"], episodes=8, seed=3, **SHORT)
     assert found.returns[0, 0] > found.returns[1, 1] == 0.0
     one, mate = make_agent("still"), {"drivers": {"paddle_1": "allround"}}
     alone = evaluate(one, "rally", episodes=8, seed=3, **{**SHORT, **mate})
@@ -37,16 +34,25 @@ def test_every_player_meets_every_other_in_both_roles():
 
 def test_in_doubles_mates_are_drawn_and_opponents_given():
     rivals = {"drivers": {"paddle_2": "still", "paddle_3": "still"}}
-    found = play_together(
-        "doubles", players("allround", "still"), 4, 3, {**SHORT, **rivals}
-    )
+    names, given = ["allround", "still"], {"episodes": 4, "seed": 3, **SHORT}
+    found = ah.crossplay("doubles", names, **given, **rivals)
     assert found.returns[0, 0] > 0.0
     with pytest.raises(ValueError, match="paddle_2"):
-        play_together("doubles", players("allround", "still"), 4, 3, SHORT)
+        ah.crossplay("doubles", names, **given)
+
+
+def test_policies_of_the_zoo_play_as_they_were_trained():
+    found = ah.crossplay(
+        "rally", {"learned": "zoo/rally", "script": "allround"}, episodes=8
+    )
+    assert found.names == ("learned", "script")
+    assert found.success[0, 0] > 0.5
 
 
 def test_what_cannot_be_played_is_named():
+    with pytest.raises(ValueError, match="a list of names is expected"):
+        ah.crossplay("rally", "still")
     with pytest.raises(ValueError, match="two players"):
-        play_together("rally", players("still"))
+        ah.crossplay("rally", ["still"])
     with pytest.raises(ValueError, match="'duel' has no team of two"):
-        play_together("duel", players("still", "allround"))
+        ah.crossplay("duel", ["still", "allround"])

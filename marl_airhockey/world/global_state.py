@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from gymnasium import spaces
@@ -10,7 +11,9 @@ from gymnasium import spaces
 from marl_airhockey.core.parameters import PUCK_SPEED_CAP
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.world import World
+
+if TYPE_CHECKING:
+    from marl_airhockey.world.world import World
 
 MOST = 10.0
 """Bound of the numbers in the scenario's memory: infinity (never) is shown as this."""
