@@ -28,7 +28,11 @@ COLUMNS = {
 
 
 def script(name):
-    return runpy.run_path(str(ROOT / "scripts" / name))
+    path = ROOT / "scripts" / name
+    with pytest.MonkeyPatch.context() as patch:
+        # Scripts import what lies beside them.
+        patch.syspath_prepend(path.parent)
+        return runpy.run_path(str(path))
 
 
 def rows_of(name):
@@ -195,8 +199,7 @@ def test_tables_of_offline_learning_are_those_of_their_rows():
     ]
 
 
-def test_what_the_paper_announces_is_that_of_its_rows(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "scripts/reproduce")
+def test_what_the_paper_announces_is_that_of_its_rows():
     header, *made = script("reproduce/announced.py")["table"]()
     shown = table("docs/offline.md", "study", "case")
     assert shown == [dict(zip(header, line, strict=True)) for line in made]
