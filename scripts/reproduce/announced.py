@@ -162,13 +162,13 @@ def main(
             if k == 0:
                 print(f"| {' | '.join(['---'] * len(cells))} |")
         return
-    cells = [
+    wanted = [
         (name, case, seed)
         for seed in range(seeds)
         for name in studies.split(",")
         for case in STUDIES[name].cases
     ]
-    compute(BOOK.at(rows), cells, train_case, folder, jobs, again)
+    compute(BOOK.at(rows), wanted, train_case, folder, jobs, again)
 
 
 if __name__ == "__main__":

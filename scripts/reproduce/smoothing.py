@@ -191,10 +191,11 @@ def main(
     }
     wanted = book.missing(list(cells), again)
     with ProcessPoolExecutor(jobs) as pool:
-        running = {
-            cell: pool.submit(measure, *cell[:3], cells[cell], episodes)
-            for cell in wanted
-        }
+        running = {}
+        for cell in wanted:
+            task, commands, limits, *_ = cell
+            words = task, commands, limits, cells[cell], episodes
+            running[cell] = pool.submit(measure, *words)
         for cell, done in running.items():
             book.keep(dict(zip(COLUMNS[:5], cell, strict=True)) | done.result())
             print(*cell, *done.result().values(), flush=True)

@@ -26,7 +26,8 @@ def look() -> None:
     print("\n== One task by gymnasium, a game by PettingZoo, 1024 worlds at a time")
     env = gymnasium.make("marl_airhockey/Juggle-v0")
     seen, _ = env.reset(seed=0)
-    for name, value in zip(env.unwrapped.observation_labels, seen, strict=True):
+    labels = env.get_wrapper_attr("observation_labels")
+    for name, value in zip(labels, seen, strict=True):
         print(f"{name:18s} {value: .3f}")
     duel = ah.parallel_env("duel")
     duel.reset(seed=0)

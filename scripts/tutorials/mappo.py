@@ -8,7 +8,7 @@ what no agent sees alone. In rally both are paid whenever the puck crosses the m
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -22,14 +22,10 @@ GAMMA, LAMBDA, CLIP, RATE = 0.99, 0.95, 0.2, 1e-3
 
 
 def network(scale: np.ndarray, outputs: int) -> nn.Module:
-    """Return a network of inputs that are divided by their largest values."""
-
-    class Scaled(nn.Sequential):
-        def forward(self, inputs: Tensor) -> Tensor:
-            return super().forward(inputs / torch.as_tensor(scale))
-
+    """Return a network of inputs, of which the largest values are given."""
     first, second = nn.Linear(len(scale), 64), nn.Linear(64, 64)
-    return Scaled(first, nn.Tanh(), second, nn.Tanh(), nn.Linear(64, outputs))
+    first.weight.data /= torch.as_tensor(scale)
+    return nn.Sequential(*(first, nn.Tanh(), second, nn.Tanh()), nn.Linear(64, outputs))
 
 
 def advantages(reward: Tensor, value: Tensor, last: Tensor, alive: Tensor) -> Tensor:
@@ -58,7 +54,7 @@ def main(
     parameters = [*policy.parameters(), *critic.parameters(), log_std]
     optimizer = torch.optim.Adam(parameters, RATE)
 
-    def spread(observed: Tensor) -> torch.distributions.Normal:
+    def spread(observed: Tensor) -> Any:
         return torch.distributions.Normal(policy(observed), log_std.exp())
 
     for update in range(updates):
@@ -83,7 +79,9 @@ def main(
         gain = ((gain - gain.mean()) / (gain.std() + 1e-8)).flatten()
         flat = [x.flatten(0, 1) for x in (obs, states, actions, old)]
         for _ in range(EPOCHS):
-            for rows_of in torch.randperm(len(target)).split(BATCH):
+            order = torch.randperm(len(target))
+            for k in range(0, len(order), BATCH):
+                rows_of = order[k : k + BATCH]
                 o, s, a, before = (x[rows_of] for x in flat)
                 ratio = (spread(o).log_prob(a).sum((-1, -2)) - before).exp()
                 clipped = ratio.clamp(1 - CLIP, 1 + CLIP)
