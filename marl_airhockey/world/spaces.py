@@ -39,7 +39,7 @@ def observation_space(observer: Observer, observe: str | None = None) -> Any:
 
 
 class WorldSpaces:
-    """Mixin of worlds: spaces of one open seat, and the state that a critic may know."""
+    """Mixin of worlds: spaces of an open seat, and the state that a critic may know."""
 
     observer: Observer
 
