@@ -67,8 +67,9 @@ def test_a_participant_goes_through_a_plan(plan, tmp_path):
     assert "striker" not in texts, "who is played stays with the leader"
     (found,) = diaries(out)
     assert [row["kind"] for row in found.rows] == [
-        *("diary", "consent", "begin", "game", "begin", "game", "answer", "answer"),
-        *("begin", "game", "answer", "answer", "end"),
+        *("diary", "consent", "begin", "recording", "game"),
+        *2 * ("begin", "recording", "game", "answer", "answer"),
+        "end",
     ]
     assert found.rows[1]["version"] == "3"
     metas = [read_head(path) for path in sorted(found.folder.glob("*-duel"))]
