@@ -44,10 +44,12 @@ def test_killed_study_loses_less_than_a_second_of_a_game(tmp_path):
         server.kill()
         server.wait(10)
     (diary,) = diaries(out)
-    assert [row["kind"] for row in diary.rows] == ["diary", "consent", "begin"]
+    kinds = ["diary", "consent", "begin", "recording"]
+    assert [row["kind"] for row in diary.rows] == kinds
     (game,) = read_answers(out).games
     assert (game["result"], game["practice"]) == (CUT_OFF, True)
     (path,) = diary.folder.glob("*-duel")
+    assert game["recording"] == path.name
     (episode,) = read_recording(path).episodes
     assert episode.reason == ""
     assert len(episode) >= shown - RATE
