@@ -1,4 +1,4 @@
-"""Length of an episode, as gymnasium's specifications of environments hold it."""
+"""Length of an episode, also as gymnasium's specifications hold it."""
 
 from __future__ import annotations
 
@@ -7,10 +7,24 @@ from gymnasium.envs.registration import EnvSpec
 from marl_airhockey.world.world import World
 
 
-class SpecifiedLength:
-    """Mixin whose ``spec`` always holds the length of an episode."""
+class EpisodeLength:
+    """Mixin with the length of an episode, which can be set at any time."""
 
     world: World
+
+    @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return self.world.max_cycles
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self.world.max_cycles = cycles
+
+
+class SpecifiedLength(EpisodeLength):
+    """Mixin whose ``spec`` always holds the length of an episode."""
+
     _spec: EnvSpec | None = None
 
     @property

@@ -62,15 +62,6 @@ class AirHockeySingleEnv(CheckedAttributes, SpecifiedLength, gymnasium.Env[Any, 
         return observation[self.agent], self._named(info)
 
     @property
-    def max_cycles(self) -> int:
-        """Length of an episode in control steps."""
-        return self.world.max_cycles
-
-    @max_cycles.setter
-    def max_cycles(self, cycles: int) -> None:
-        self.world.max_cycles = cycles
-
-    @property
     def physics(self) -> dict[str, float]:
         """Physical parameters of the episode by name."""
         return self.parallel.physics

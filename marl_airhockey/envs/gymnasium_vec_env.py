@@ -86,15 +86,6 @@ class AirHockeyVectorEnv(
         return self.world.observer.labels
 
     @property
-    def max_cycles(self) -> int:
-        """Length of an episode in control steps."""
-        return self.world.max_cycles
-
-    @max_cycles.setter
-    def max_cycles(self, cycles: int) -> None:
-        self.world.max_cycles = cycles
-
-    @property
     def physics(self) -> dict[str, Array]:
         """Physical parameters of the episodes by name, (B,); copies."""
         physics = self.world.episode.physics

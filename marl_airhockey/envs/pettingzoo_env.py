@@ -13,6 +13,7 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.state import State
 from marl_airhockey.envs.attributes import CheckedAttributes
+from marl_airhockey.envs.episode_length import EpisodeLength
 from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.seats import check_some_open
@@ -33,7 +34,7 @@ WINDOW = importlib.util.find_spec("pygame") is not None
 """True if there is what a window needs: the extra "play"."""
 
 
-class AirHockeyEnv(CheckedAttributes, ParallelEnv[str, Any, Any]):  # type: ignore[misc]
+class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any]):  # type: ignore[misc]
     """World of a scenario whose open seats are the agents, ``paddle_0`` and so on.
 
     All agents stay to the end of the episode and end together. The info of an agent
@@ -90,15 +91,6 @@ class AirHockeyEnv(CheckedAttributes, ParallelEnv[str, Any, Any]):  # type: igno
         self.action_spaces = self._action_spaces
         self.state_space = self.world.critic_state_space
         self.np_random = np.random.default_rng()
-
-    @property
-    def max_cycles(self) -> int:
-        """Length of an episode in control steps."""
-        return self.world.max_cycles
-
-    @max_cycles.setter
-    def max_cycles(self, cycles: int) -> None:
-        self.world.max_cycles = cycles
 
     @property
     def teams(self) -> dict[int, list[str]]:

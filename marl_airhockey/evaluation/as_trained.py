@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -11,7 +11,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
-from marl_airhockey.registry import find_scenario, runs_code
+from marl_airhockey.registry import find_scenario, make_agent, runs_code
 from marl_airhockey.world.build import Keywords
 
 EVERYWHERE = ("profile", "control_dt", "goals")
@@ -142,3 +142,30 @@ def _require_trust(text: str, players: Mapping[str, Driver]) -> None:
         )
     unknown = f"the name of Python code that you have not trained with as it is, {text}"
     require_trust(Path(source), code=unknown)
+
+
+def seated_players(
+    players: Mapping[str, object] | Sequence[str],
+    scenario: str,
+    keywords: Keywords,
+    exact: bool,
+) -> tuple[dict[str, Driver], Keywords]:
+    """Return the drivers of players, by name, and the keywords of their environment.
+
+    Args:
+        players: Players by name, see `registry.make_agent`; or their names alone.
+        scenario: Scenario that they play.
+        keywords: Keywords that are given.
+        exact: Whether the others have their defaults, instead of those of training.
+
+    Raises:
+        ValueError: A single name instead of several, or trainings that do not agree.
+    """
+    if isinstance(players, str):
+        raise ValueError(f"players: a list of names is expected, got {players!r}")
+    named = players if isinstance(players, Mapping) else {n: n for n in players}
+    drivers = {name: make_agent(player) for name, player in named.items()}
+    if exact:
+        return drivers, keywords
+    _, keywords = as_trained(drivers, scenario, keywords)
+    return {n: seen_in(driver, keywords) for n, driver in drivers.items()}, keywords

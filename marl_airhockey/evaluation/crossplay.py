@@ -8,10 +8,9 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from marl_airhockey.evaluation.as_trained import as_trained, seen_in
+from marl_airhockey.evaluation.as_trained import seated_players
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.stats import bootstrap
-from marl_airhockey.registry import make_agent
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 
@@ -100,13 +99,7 @@ def crossplay(
     Raises:
         ValueError: A single player, a team of one, or a seat without a driver.
     """
-    if isinstance(players, str):
-        raise ValueError(f"players: a list of names is expected, got {players!r}")
-    named = players if isinstance(players, Mapping) else {n: n for n in players}
-    drivers = {name: make_agent(player) for name, player in named.items()}
-    if not exact:
-        _, keywords = as_trained(drivers, scenario, keywords)
-        drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
+    drivers, keywords = seated_players(players, scenario, keywords, exact)
     if len(drivers) < 2:
         raise ValueError("cross-play needs at least two players, of different names")
     seats = scenario_of(scenario, keywords).scene.seats

@@ -9,12 +9,11 @@ from typing import Unpack
 
 import numpy as np
 
-from marl_airhockey.evaluation.as_trained import as_trained, seen_in
+from marl_airhockey.evaluation.as_trained import seated_players
 from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.policies.runs import policies_of
-from marl_airhockey.registry import make_agent
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 
@@ -55,13 +54,7 @@ def league(
         ValueError: A single player, an odd number of games, or a scenario without
             sides that play against each other.
     """
-    if isinstance(players, str):
-        raise ValueError(f"players: a list of names is expected, got {players!r}")
-    named = players if isinstance(players, Mapping) else {n: n for n in players}
-    drivers = {name: make_agent(player) for name, player in named.items()}
-    if not exact:
-        _, keywords = as_trained(drivers, scenario, keywords)
-        drivers = {name: seen_in(driver, keywords) for name, driver in drivers.items()}
+    drivers, keywords = seated_players(players, scenario, keywords, exact)
     count = len(drivers)
     if count < 2:
         raise ValueError("a league needs at least two players, of different names")
