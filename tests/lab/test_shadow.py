@@ -127,5 +127,5 @@ def test_another_rig_and_a_moved_camera_are_named(lab, hand, rig, tmp_path):
     tags = {k: np.add(four, 0.03).tolist() for k, four in other.tags.items()}
     other = HandRig(**{**vars(other), "tags": tags})
     other.save(tmp_path / "moved.json")
-    with pytest.raises(RuntimeError, match="px from where they were"):
+    with pytest.raises(RuntimeError, match="mm from where they were"):
         ah.make_agent(f"shadow:rig={tmp_path / 'moved.json'}").__enter__()
