@@ -9,8 +9,6 @@ from typing import Any
 from marl_airhockey.world.build import Keywords
 from marl_airhockey.world.world import World
 
-SETTABLE = "max_cycles"
-"""Keyword that is an attribute, too, which can be set at any time"""
 LIKE = 0.8
 """Likeness from which a name counts as misspelt"""
 

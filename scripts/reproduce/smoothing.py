@@ -16,13 +16,13 @@ Each cell that ends adds a row to the CSV; one whose row is there is not played 
 from __future__ import annotations
 
 import itertools
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
 import typer
-from rows import DATA, Again, Book, RowsFile
+from rows import DATA, Again, Book, Row, RowsFile
 
 from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
 from marl_airhockey.core.rng import RandomStreams
@@ -174,7 +174,21 @@ def measure(
     }
 
 
+BY_CELL = {
+    (task, commands, limits, smoothing.name, f"{smoothing.time:g}"): smoothing
+    for task, commands, limits, smoothing in CELLS
+}
+"""Filter of each cell, by the values of its first columns"""
 BOOK = Book(DATA / "smoothing.csv", COLUMNS[:5])
+
+
+def row_of(
+    episodes: int, task: str, commands: str, limits: str, name: str, time: str
+) -> Row:
+    """Return the row of a cell, which the values of its first columns name."""
+    cell = task, commands, limits, name, time
+    found = measure(task, commands, limits, BY_CELL[cell], episodes)
+    return dict(zip(COLUMNS[:5], cell, strict=True)) | found
 
 
 def main(
@@ -185,20 +199,7 @@ def main(
 ) -> None:
     """Play the cells whose rows are missing."""
     book = BOOK.at(rows)
-    cells = {
-        (task, commands, limits, smoothing.name, f"{smoothing.time:g}"): smoothing
-        for task, commands, limits, smoothing in CELLS
-    }
-    wanted = book.missing(list(cells), again)
-    with ProcessPoolExecutor(jobs) as pool:
-        running = {}
-        for cell in wanted:
-            task, commands, limits, *_ = cell
-            words = task, commands, limits, cells[cell], episodes
-            running[cell] = pool.submit(measure, *words)
-        for cell, done in running.items():
-            book.keep(dict(zip(COLUMNS[:5], cell, strict=True)) | done.result())
-            print(*cell, *done.result().values(), flush=True)
+    book.fill(book.missing([*BY_CELL], again), partial(row_of, episodes), jobs)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What Windows lacks is not needed to play, to record and to list."""
+"""Playing, recording and listing need no module of Unix."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What a critic of all seats may know of a batch is what each environment tells."""
+"""Critic state of a batch: equal to that of single environments."""
 
 import numpy as np
 import pytest

@@ -123,7 +123,7 @@ class Driver:
         request, supervisor = self._box.request, self.supervisor
         position, before = self._position(reading), supervisor.state
         if before is not DriverState.FAULT:
-            # An operator's word is for a stop that the operator has seen.
+            # A confirmation is valid only for a stop that the operator could see.
             self._recovered = request.recover
         measured = Measured(
             float(position[2]),
