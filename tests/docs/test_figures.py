@@ -133,6 +133,19 @@ def test_sentences_of_the_readme_are_those_of_the_rows():
     assert f"success {arm[worst]:.3f} ({worst}) to {best:.3f} in the profile" in text
 
 
+def test_the_table_of_speed_is_that_of_its_run():
+    found = json.loads((DATA / "speed.json").read_text())
+    shown = table("README.md", "ours / this")
+    agents = {"env-steps": "env_steps_per_cpu_s"}
+    for row, run in zip(shown, found, strict=True):
+        _, *cells = [cell.strip("*") for cell in row.values()]
+        rates = [run["env_steps_per_cpu_s"], run["agent_steps_per_cpu_s"]]
+        assert cells == [*(f"{x:,.0f}" for x in rates), f"{run['ours_over_this']:.3g}"]
+        unit = run["compared"].replace("-", "_").split(" of ")[0] + "_per_cpu_s"
+        ours = next(r for r in found if r["name"] == run["ours"])
+        assert run["ours_over_this"] == pytest.approx(ours[unit] / run[unit])
+
+
 def test_blind_columns_are_those_of_the_search():
     rows = {(r["task"], r["profile"]): r["success"] for r in rows_of("blind.csv")}
     for page, profile, number in (
