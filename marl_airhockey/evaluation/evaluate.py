@@ -251,7 +251,7 @@ class EpisodeStatistics:
 def _act_ms(world: World) -> float:
     """Return the median CPU time of a decision of paddle_0 in a single world, ms."""
     seat = world.driven[0]
-    view = seat.view(world.sensed, world.memory, world.episode.physics)
+    view = seat.view(world.known)
     state = view.state.map(lambda x: x[:1])
     seen = view.observation
     one = {k: v[:1] for k, v in seen.items()} if isinstance(seen, Mapping) else seen[:1]

@@ -146,12 +146,9 @@ class MatchDrivers:
 
         Of one that is position-driven and commands no device it is 0.
         """
-        world = self._world
         if not self._driven[i].acts:
             return np.zeros((1, 2))
-        return self._driven[i].act(
-            world.sensed, world.memory, world.episode.physics, world.episode.cycles
-        )
+        return self._driven[i].act(self._world.known)
 
     def prescribed(self) -> Array | None:
         """Return (1, seats, 4) where led paddles are, nan for those that ask.

@@ -11,11 +11,10 @@ from marl_airhockey.contracts.backend import Command
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
 from marl_airhockey.sensing.delay import Delay
-from marl_airhockey.types import Array, Memory
+from marl_airhockey.types import Array
 from marl_airhockey.world.driven_seat import DrivenSeat
-from marl_airhockey.world.episode import Episode
+from marl_airhockey.world.known import Known
 
 
 class Inputs(NamedTuple):
@@ -77,23 +76,14 @@ class Actions:
         if self._delay is not None:
             self._delay.fill(worlds, 0.0)
 
-    def collect(
-        self,
-        actions: Array,
-        prescribed: Array | None,
-        sensed: State,
-        memory: Memory,
-        episode: Episode,
-    ) -> Array:
+    def collect(self, actions: Array, prescribed: Array | None, known: Known) -> Array:
         """Fill `inputs`; return the requested actions (B, seats, 2), before any delay.
 
         Args:
             actions: Actions (B, open, 2) of the open seats.
             prescribed: Positions and velocities (B, open, 4) of paddles of open seats,
                 nan for those that request an action; None if all do.
-            sensed: State that drivers observe, table frame.
-            memory: Memory of the scenario.
-            episode: Counters and physics of the running episodes.
+            known: What seats know before the step.
 
         Raises:
             ValueError: A wrong shape, or a paddle prescribed at infinity.
@@ -118,19 +108,18 @@ class Actions:
         for seat in self._driven:
             k, acts = seat.index, seat.acts
             if acts:
-                values, cycles = episode.physics, episode.cycles
-                requested[:, k] = seat.act(sensed, memory, values, cycles)
+                requested[:, k] = seat.act(known)
             measured = seat.measured()
             if measured is not None:
                 self._position(k, measured, acts)
-        eliminated = self._scenario.eliminated(memory)
+        eliminated = self._scenario.eliminated(known.memory)
         if eliminated is not None and eliminated.any():
             self._elimination.apply(eliminated, inputs)
             self._positioned = True
         if self._delay is None:
             return requested
         requested = requested.copy()
-        delay = episode.physics["action_delay"]
+        delay = known.physics["action_delay"]
         inputs.action[:] = self._delay.push(requested, delay)
         return requested
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.core.rng import StreamSet
-from marl_airhockey.core.state import State
-from marl_airhockey.types import ALL, Array, Memory, Rows
+from marl_airhockey.types import ALL, Array, Rows
+from marl_airhockey.world.known import Known
 from marl_airhockey.world.observer import Observation, Observer
 
 
@@ -82,19 +82,12 @@ class DrivenSeat:
         """Return (B, 4) the measured paddle, if the driver is position-driven."""
         return self.driver.measured()
 
-    def act(
-        self,
-        sensed: State,
-        memory: Memory,
-        physics: dict[str, Array],
-        cycles: Array,
-        worlds: Rows = ALL,
-    ) -> Array:
+    def act(self, known: Known, worlds: Rows = ALL) -> Array:
         """Return the actions in some worlds, (W, 2) fractions in the ego frame."""
-        due, held = cycles[worlds] % self.every == 0, self._held[worlds]
+        due, held = known.cycles[worlds] % self.every == 0, self._held[worlds]
         if not due.any():
             return held
-        view = self.view(sensed, memory, physics, worlds)
+        view = self.view(known, worlds)
         kept = {name: value[worlds] for name, value in self._memory.items()}
         answer = self.driver.act(view, kept)
         who = f"driver of paddle_{self.index} ({type(self.driver).__name__})"
@@ -115,26 +108,21 @@ class DrivenSeat:
         self._held[worlds] = np.where(due[:, None], action, held)
         return self._held[worlds]
 
-    def view(
-        self,
-        sensed: State,
-        memory: Memory,
-        physics: dict[str, Array],
-        worlds: Rows = ALL,
-    ) -> View:
+    def view(self, known: Known, worlds: Rows = ALL) -> View:
         """Return the view of the driver in some worlds; arrays are of all of them."""
+        sensed = known.sensed
 
         def read() -> Observation:
             seats, form = np.array([self.index]), self.driver.observe
-            shown = self._observer.read(sensed, memory, seats, form, worlds)
+            shown = self._observer.read(sensed, known.memory, seats, form, worlds)
             if isinstance(shown, Mapping):
                 return {name: array[:, 0] for name, array in shown.items()}
             return np.asarray(shown)[:, 0]
 
-        state, known = self._observer.known(sensed, memory)
+        state, memory = self._observer.known(sensed, known.memory)
         if worlds is not ALL:
             state = state.map(lambda x: x[worlds])
-            known = {name: value[worlds] for name, value in known.items()}
+            memory = {name: value[worlds] for name, value in memory.items()}
         position, velocity = state.position, state.velocity
         if self._observer.reaction:
             position, velocity = position.copy(), velocity.copy()
@@ -148,11 +136,11 @@ class DrivenSeat:
             state=replace(state, position=position, velocity=velocity),
             read=read,
             labels=self._layout.labels,
-            top_speed=physics["paddle_speed"][worlds],
+            top_speed=known.physics["paddle_speed"][worlds],
             reach=np.asarray(self._seat.reach),
             rng=self._streams.of(self._purpose).select(worlds),
             seat=self.index,
             control_dt=self._own_dt,
-            scenario_memory=known,
+            scenario_memory=memory,
             reaction=self._observer.reaction,
         )

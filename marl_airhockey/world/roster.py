@@ -51,10 +51,9 @@ class Roster:
 
     def ask(self, actions: Array) -> None:
         """Fill in (B, seats, 2) what players ask for; other seats are left alone."""
-        world, episode = self.world, self.world.episode
-        now = world.sensed, world.memory, episode.physics, episode.cycles
-        for player, seat, rows in self._sitting(np.arange(world.num_worlds)):
-            actions[rows, seat] = self._seats[player][seat].act(*now, rows)
+        known = self.world.known
+        for player, seat, rows in self._sitting(np.arange(self.world.num_worlds)):
+            actions[rows, seat] = self._seats[player][seat].act(known, rows)
 
     def _sitting(self, worlds: Array) -> list[tuple[int, int, Array]]:
         """Player, seat and the worlds, among some, where the one sits at the other."""

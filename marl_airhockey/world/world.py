@@ -35,6 +35,7 @@ from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.elements import DragRegions, check_elements, clear_start
 from marl_airhockey.world.episode import Episode, PhysicsRows
+from marl_airhockey.world.known import Known
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.placement import check_placement
 from marl_airhockey.world.referee import Referee
@@ -100,7 +101,7 @@ class World(WorldSpaces):
         self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
         self._episode = Episode.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
-        self._sensed = self._known = self._judged = self._state
+        self._sensed = self._best = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
         check_elements(scenario, backend.senses_itself)
@@ -136,9 +137,9 @@ class World(WorldSpaces):
         return {name: array.copy() for name, array in self._memory.items()}
 
     @property
-    def sensed_memory(self) -> Memory:
-        """Memory as seats know it from what they sense; freshly allocated."""
-        return {name: array.copy() for name, array in self._known_memory.items()}
+    def known(self) -> Known:
+        """What seats know now; freshly allocated, but for the physics."""
+        return self._known.copied()
 
     @property
     def episode(self) -> Episode:
@@ -381,12 +382,17 @@ class World(WorldSpaces):
         """Let seats know the memory in some worlds, by index, as it is."""
         if self._follower is not None:
             self._follower.begin(worlds, self._memory)
-            self._known = self.sensor.best(self._sensed)
+            self._best = self.sensor.best(self._sensed)
 
     def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
         """Put rows of a state and a memory into some worlds, by index."""
         self._built.now.write(worlds, rows, memory)
         self.backend.reset(self._state, worlds)
+
+    @property
+    def _known(self) -> Known:
+        memory, episode = self._known_memory, self._episode
+        return Known(self._sensed, memory, episode.physics, episode.cycles)
 
     @property
     def _known_memory(self) -> Memory:
@@ -423,8 +429,8 @@ class World(WorldSpaces):
             RuntimeError: Before the first `reset`.
             ValueError: A wrong shape, or an element that is not finite.
         """
-        step, now = self._built, (self._sensed, self._known_memory, self._episode)
-        self._requested = self._actions.collect(actions, prescribed, *now)
+        step = self._built
+        self._requested = self._actions.collect(actions, prescribed, self._known)
         self.sensor.note(self._requested)
         if self._drag is not None:
             self._drag.update(self.backend, self._state, self._episode.physics)
@@ -450,8 +456,8 @@ class World(WorldSpaces):
         observer, seats = self.observer, self.open
         self._sensed = self.sensor.sense(*self._true)
         if self._follower is not None:
-            before, self._known = self._known, self.sensor.best(self._sensed)
-            step = before, moment.realized.velocity, self._known
+            before, self._best = self._best, self.sensor.best(self._sensed)
+            step = before, moment.realized.velocity, self._best
             self._follower.update(*step, self._memory)
             if self.scenario.goals == "dict":
                 known = self._sensed, self._known_memory, observer.observe

@@ -39,7 +39,7 @@ def test_learners_and_opponents_share_an_environment(tmp_path):
     rng = np.random.default_rng(0)
     for _ in range(130):
         world = env.world.observer.read(
-            env.world.sensed, env.world.sensed_memory, np.arange(4)
+            env.world.sensed, env.world.known.memory, np.arange(4)
         )
         np.testing.assert_array_equal(seen, world[env._rows, env._seats])
         actions = rng.uniform(-1, 1, (env.num_envs, 2)).astype(np.float32)

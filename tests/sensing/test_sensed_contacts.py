@@ -65,7 +65,7 @@ def test_what_observations_say_of_contacts_has_the_errors_of_the_camera():
     ahead, errors = 0, []
     for _ in range(60):
         world.step(np.zeros((200, 0, 2)))
-        true, known = world.memory, world.sensed_memory
+        true, known = world.memory, world.known.memory
         ahead += (known["touches"] > true["touches"]).sum()
         both = (true["armed"] > 0) & (known["armed"] > 0)
         errors.append((known["struck_at"] - true["struck_at"])[both])
@@ -83,7 +83,7 @@ def test_the_score_of_a_game_is_announced_and_possession_is_sensed():
     for _ in range(300):
         action = np.clip(0.8 * action + 0.6 * rng.uniform(-1, 1, action.shape), -1, 1)
         world.step(action)
-        true, known = world.memory, world.sensed_memory
+        true, known = world.memory, world.known.memory
         for name in world.scenario.announced:
             np.testing.assert_array_equal(known[name], true[name])
         different += (known["held"] != true["held"]).sum()
@@ -97,7 +97,7 @@ def test_without_simulated_sensing_the_memory_itself_is_shown():
     world.reset(0)
     idle(world, 1.0)
     for name, array in world.memory.items():
-        np.testing.assert_array_equal(world.sensed_memory[name], array)
+        np.testing.assert_array_equal(world.known.memory[name], array)
 
 
 def test_a_puck_that_passes_a_paddle_has_no_contact_with_it():

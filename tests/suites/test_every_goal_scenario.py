@@ -57,7 +57,7 @@ def test_reward_success_and_compute_reward_agree(goal_scenario, profile):
     for _ in range(world.max_cycles):
         step = world.step(np.zeros((worlds, 0, 2)))
         wanted = game.desired(world.memory).astype(np.float32)
-        shown = game.achieved(world.sensed, world.sensed_memory).astype(np.float32)
+        shown = game.achieved(world.sensed, world.known.memory).astype(np.float32)
         achieved.append(shown)
         rewards.append(game.shown_reward(shown, wanted))
         true = game.achieved(world.state, world.memory).astype(np.float32)
