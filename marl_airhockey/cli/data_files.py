@@ -86,18 +86,6 @@ def relabel(
     show(paths, False)
 
 
-def convert(
-    files: Annotated[
-        list[Path], typer.Argument(help="Files of former versions, *.rec.")
-    ],
-    out: Annotated[Path, typer.Option(help="Folder of the recordings.")],
-) -> None:
-    """Write recordings of former versions as recordings of today."""
-    from marl_airhockey.data.format_3 import convert as converted
-
-    show([converted(path, out) for path in files], False)
-
-
 def extract(
     video: Annotated[
         Path, typer.Argument(help="A video of a table, or a recording with one.")
@@ -194,5 +182,5 @@ def import_dataset(
     show([imported(given)], False)
 
 
-COMMANDS = (repair, merge, split, convert, relabel, extract, export)
+COMMANDS = (repair, merge, split, relabel, extract, export)
 """Functions of the commands but `import`, whose name is a word of Python"""

@@ -63,9 +63,7 @@ def recordings_in(paths: Sequence[Path]) -> list[Path]:
             raise ValueError(f"{path}: there is no such file or folder{hint}")
         found += sorted(meta.parent for meta in where.rglob(META))
     if not found:
-        old = next((f for path in paths for f in path.rglob("*.rec")), None)
-        hint = "; files *.rec: airhockey data convert" if old else ""
-        raise ValueError(f"{paths[0]}: there are no recordings in it ({META}){hint}")
+        raise ValueError(f"{paths[0]}: there are no recordings in it ({META})")
     return found
 
 

@@ -54,9 +54,8 @@ def read_head(path: Path) -> dict[str, Any]:
         raise ValueError(f"{file}: no recording of marl_airhockey")
     found, dt = head["format"], head.get("control_dt")
     if found != FORMAT:
-        age = "older" if isinstance(found, int) and found < FORMAT else "other"
         raise ValueError(
-            f"{path}: recorded by an {age} version of marl_airhockey (format {found}); "
+            f"{path}: recorded by another version of marl_airhockey (format {found}); "
             f"this version reads format {FORMAT}"
         )
     if not isinstance(head.get("scenario"), str):

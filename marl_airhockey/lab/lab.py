@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
@@ -219,18 +218,3 @@ class LabClient(DoorClient):
             return None if port is None else LabClient(port)
         except OSError:
             return None
-
-
-def wait_for_lab(seconds: float = START) -> LabClient:
-    """Wait for a lab that is starting and return a client.
-
-    Raises:
-        RuntimeError: The lab does not start in time.
-    """
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
-        client = LabClient.find()
-        if client is not None:
-            return client
-        time.sleep(0.05)
-    raise RuntimeError(f"lab: it did not start within {seconds:.0f} s")

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 from marl_airhockey.core.profiles import SUFFIX, find_profile
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
-from marl_airhockey.learn.settings import check_names, renamed
+from marl_airhockey.learn.settings import check_names
 from marl_airhockey.registry import find_scenario
 
 
@@ -108,7 +108,7 @@ def preset(scenario: str, changes: Mapping[str, Any] | None = None) -> PPOConfig
     place, colon, name = scenario.partition(":")
     if place.endswith(".py"):  # A run goes on from any folder.
         scenario = f"{Path(place).expanduser().resolve()}{colon}{name}"
-    changes = renamed(changes or {})
+    changes = changes or {}
     game = find_scenario(scenario, **changes.get("options", {}))
     text = resources.files(__package__).joinpath("presets.toml").read_text()
     presets = tomllib.loads(text)

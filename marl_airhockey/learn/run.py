@@ -59,8 +59,7 @@ class Progress:
     def load(path: Path) -> Progress:
         """Read what `save` wrote."""
         data = json.loads(path.read_text())
-        learning = data.pop("cpu_seconds")  # Older runs have counted nothing else.
-        data = {"learning_cpu_seconds": learning, **data}
+        data.pop("cpu_seconds")  # The sum of the others, for readers of the file.
         return Progress(**{**data, "best": tuple(data["best"])})
 
 
@@ -157,14 +156,10 @@ class TrainingRun(Generic[Config]):
         return self.latest
 
     def _write(self, row: Metrics) -> None:
-        """Add a row to the table, with the columns that it has."""
-        columns = list(row)
-        if self._table.exists():
-            with self._table.open() as file:
-                columns = next(csv.reader(file))
+        """Add a row to the table."""
         fresh = not self._table.exists()
         with self._table.open("a", newline="") as file:
-            writer = csv.DictWriter(file, columns, extrasaction="ignore")
+            writer = csv.DictWriter(file, list(row))
             if fresh:
                 writer.writeheader()
             writer.writerow(row)

@@ -1,4 +1,4 @@
-"""Settings of runs in files: read, refused, with the names of earlier versions."""
+"""Settings of runs in files: read, checked, refused."""
 
 from __future__ import annotations
 
@@ -15,23 +15,6 @@ from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import runs_code
 
 C = TypeVar("C", bound=RunConfig)
-RENAMED = {
-    "mirror": "self_play_fraction",
-    "script_share": "scripted_fraction",
-    "priority": "opponent_sampling_exponent",
-    "highest_rate": "max_learning_rate",
-}
-"""Names of settings in this version by those of earlier ones"""
-PACE = "opponent_pace"
-"""Earlier setting: the low end of ``opponent_speed_range``, whose high end was 1"""
-
-
-def renamed(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings by the names of this version."""
-    found = {RENAMED.get(name, name): value for name, value in settings.items()}
-    if PACE in found:
-        found["opponent_speed_range"] = [found.pop(PACE), 1.0]
-    return found
 
 
 def check_names(kind: type[RunConfig], settings: Mapping[str, Any]) -> None:
@@ -61,7 +44,7 @@ def read_settings(path: Path) -> dict[str, Any]:
     if "scenario" in data:
         check_run_format(path.parent, found)
     _refuse_code(path, data)
-    return renamed(data)
+    return data
 
 
 def load_config(kind: type[C], path: Path) -> C:

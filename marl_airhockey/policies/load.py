@@ -7,7 +7,7 @@ from pathlib import Path
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.onnx import load_onnx
 from marl_airhockey.policies.policy import Policy, policy_driver
-from marl_airhockey.policies.runs import policies_of, run_settings
+from marl_airhockey.policies.runs import policies_of
 from marl_airhockey.policies.sb3 import load_sb3
 
 ZOO = Path(__file__).parents[1] / "zoo"
@@ -58,6 +58,4 @@ def load_policy(
             f"{path}: expected a run folder, a stable-baselines3 .zip, an .onnx file "
             "or an .npz"
         )
-    # Cards of older runs have less than the settings in the same folder.
-    policy.trained_in = {**run_settings(path.parent), **policy.trained_in}
     return policy

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from marl_airhockey.policies.card import current_card
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
@@ -111,7 +110,7 @@ class NumpyPolicy:
         """
         try:
             arrays = _read(path)
-            card = current_card(json.loads(str(arrays.pop("card"))))
+            card = json.loads(str(arrays.pop("card")))
             count = sum(name.startswith("weight_") for name in arrays)
             pairs = [(arrays[f"weight_{i}"], arrays[f"bias_{i}"]) for i in range(count)]
             parts = arrays["centre"], arrays["unit"], arrays["log_std"]
@@ -139,6 +138,8 @@ class NumpyPolicy:
         arrays = [self.centre, self.unit, self.log_std, *sum(self.layers, ())]
         if not all(a.dtype.kind == "f" and np.isfinite(a).all() for a in arrays):
             raise ValueError("every element must be a finite number")
+        if not isinstance(self.card, Mapping):
+            raise ValueError("its card is no object")
         observe = self.card.get("observe")
         if (self.unit == 0.0).any() or not isinstance(observe, (str, type(None))):
             raise ValueError("a unit is 0, or `observe` is no text")

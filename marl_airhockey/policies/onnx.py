@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.policies.card import current_card
 from marl_airhockey.policies.policy import Policy, trained_in
 from marl_airhockey.types import Array
 
@@ -49,7 +48,7 @@ class _OnnxModel:
             found = json.loads(metadata.get(ONNX_CARD, "{}"))
         except ValueError:
             return {}
-        return current_card(found) if isinstance(found, dict) else {}
+        return found if isinstance(found, dict) else {}
 
     def __call__(self, observation: Any, deterministic: bool) -> Array:
         rows = np.asarray(observation, np.float32)

@@ -1,12 +1,8 @@
-"""Runs of training: the files of their policies, their format and settings."""
+"""Runs of training: the files of their policies, and their format."""
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Any
-
-from marl_airhockey.policies.policy import trained_in
 
 RUN_FORMAT = 2
 """Format of a run's folder, in its ``config.toml`` and in the card of its zips.
@@ -35,11 +31,3 @@ def check_run_format(source: Path, found: int) -> None:
             f"format {found}, this version reads {RUN_FORMAT}); train it again "
             "in another folder"
         )
-
-
-def run_settings(folder: Path) -> dict[str, Any]:
-    """Return the environment that the settings in a run's folder name, if any."""
-    try:
-        return trained_in(tomllib.loads((folder / "config.toml").read_text()))
-    except (OSError, ValueError):
-        return {}

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.policies.card import current_card
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.policies.runs import check_run_format
@@ -40,8 +39,8 @@ def load_sb3(path: Path, deterministic: bool, trust: bool | None) -> Policy:
         module = data["policy_class"]["__module__"]
     except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
         raise ValueError(f"{wrong} ({error})") from error
-    if "card" in data:  # of our own training
-        card = current_card(data["card"])
+    card = data.get("card")
+    if isinstance(card, dict):  # of our own training
         check_run_format(path, card.get("run_format", 1))
         if card.get("observe") != "pixels":
             own = numpy_actor(load_weights(path), card)

@@ -9,7 +9,6 @@ from runs import SMALL
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.as_trained import as_trained, describe_environment
-from marl_airhockey.policies.load import ZOO, load_policy
 from marl_airhockey.registry import make_agent
 
 GENTLE = """
@@ -63,18 +62,6 @@ def test_commands_say_what_they_play(gentle_run):
     given = ("--profile", "ideal", "--json", "--no-floors", "--episodes", "2")
     found = json.loads(airhockey("evaluate", gentle_run, *given).stdout)
     assert found["profile"] == "ideal"
-
-
-def test_an_older_run_is_read_from_its_settings(touch_run, tmp_path):
-    policy = load_policy(touch_run)
-    assert policy.trained_in["scenario"] == "touch"
-    bare = tmp_path / "bare"
-    bare.mkdir()
-    settings = (touch_run / "config.toml").read_text()
-    (bare / "config.toml").write_text(settings.replace('"ideal"', '"ur5e"'))
-    (bare / "best.npz").write_bytes((ZOO / "touch.npz").read_bytes())
-    assert "control_dt" not in make_agent("zoo/touch").trained_in
-    assert load_policy(bare).trained_in["control_dt"] == 0.05
 
 
 def test_code_that_was_not_trained_with_is_refused(gentle_run, tmp_path):

@@ -54,18 +54,6 @@ def test_shots_are_paid_in_training_alone():
     assert given.training_keywords["options"] == {"shot_weight": 0.0}
 
 
-def test_settings_of_earlier_versions_are_read_by_their_new_names(tmp_path):
-    old = {"mirror": 0.25, "script_share": 0.75, "priority": 1.0, "opponent_pace": 0.5}
-    config = preset("duel", {**old, "highest_rate": 1e-3})
-    assert config.self_play_fraction == 0.25
-    assert config.scripted_fraction == 0.75
-    assert config.opponent_sampling_exponent == 1.0
-    assert config.opponent_speed_range == [0.5, 1.0]
-    assert config.max_learning_rate == 1e-3
-    path = tmp_path / "config.toml"
-    text = config.to_toml().replace("opponent_speed_range = [0.5, 1.0]", "")
-    text = text.replace("self_play_fraction", "mirror")
-    path.write_text(text.replace("seed = 0", "seed = 0\nopponent_pace = 0.5"))
-    assert load_config(PPOConfig, path) == config
+def test_a_range_whose_ends_are_exchanged_is_refused():
     with pytest.raises(ValueError, match="opponent_speed_range"):
         preset("duel", {"opponent_speed_range": [0.9, 0.1]})

@@ -168,24 +168,6 @@ def test_all_cpu_time_is_counted_by_kind(tmp_path):
     assert float(last["learning_cpu_seconds"]) == pytest.approx(state[kinds[0]])
 
 
-def test_an_older_run_resumes_with_the_columns_that_it_has(tmp_path):
-    folder = tmp_path / "run"
-    run_training(preset("touch", SMALL), folder)
-    kept = ("steps", "cpu_seconds", "success", "return")
-    old = [",".join(row[name] for name in kept) for row in rows(folder)]
-    (folder / "evaluations.csv").write_text("\n".join([",".join(kept), *old]) + "\n")
-    state = json.loads((folder / "state.json").read_text())
-    names = ("steps", "cpu_seconds", "wall_seconds", "rate", "best")
-    (folder / "state.json").write_text(json.dumps({n: state[n] for n in names}))
-    config = (folder / "config.toml").read_text()
-    (folder / "config.toml").write_text(config.replace("16384", "32768"))
-    run_training(None, folder)
-    found = rows(folder)
-    assert len(found) > len(old)
-    assert list(found[-1]) == list(kept)
-    assert float(found[-1]["cpu_seconds"]) > state["cpu_seconds"]
-
-
 def test_evaluations_of_a_game_are_a_share_of_its_training():
     def steps(config):
         return config.evaluations * config.eval_episodes * len(config.rivals) * 1200

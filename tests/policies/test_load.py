@@ -129,16 +129,3 @@ def test_an_exported_policy_is_one_small_file(tmp_path):
     (tmp_path / "bad.npz").write_bytes(b"nothing")
     with pytest.raises(ValueError, match="no policy of ours"):
         NumpyPolicy.load(tmp_path / "bad.npz")
-
-
-def test_labels_of_earlier_versions_are_read_by_their_new_names(tmp_path):
-    card = {"labels": ["own.asked[-1].x", "own.then.x", "puck_0.now.vx", "puck_0.x"]}
-    layers = [(np.ones((2, 4), np.float32), np.zeros(2, np.float32))]
-    scale = np.zeros(4, np.float32), np.ones(4, np.float32)
-    NumpyPolicy(layers, *scale, np.zeros(2, np.float32), card).save(tmp_path / "a.npz")
-    assert NumpyPolicy.load(tmp_path / "a.npz").card["labels"] == [
-        "own.requested[-1].x",
-        "own.delayed.x",
-        "puck_0.predicted.vx",
-        "puck_0.x",
-    ]

@@ -21,7 +21,6 @@ from marl_airhockey.lab.ur_controller.dashboard import LOCKED
 from marl_airhockey.lab.ur_controller.safety import Safety
 from marl_airhockey.types import Array
 
-COMMAND = "input_int_register_0"
 SCRIPT = "reg_offset_int = 0"
 """Text by which an emulated controller recognizes a control script"""
 FAULTS = {
