@@ -19,6 +19,7 @@ from .registry import backend_names as backend_names
 from .registry import make_agent as make_agent
 from .registry import make_scenario as make_scenario
 from .registry import scenario_names as scenario_names
+from .rollout.rollout import rollout as rollout
 
 __version__: str
 

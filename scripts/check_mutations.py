@@ -209,9 +209,9 @@ FAULTS = [
     ),
     Fault(
         "last step is not recorded",
-        "marl_airhockey/data/record.py",
-        "value[i, : lengths[i]] for n",
-        "value[i, : lengths[i] - 1] for n",
+        "marl_airhockey/rollout/collector.py",
+        "value[i, :length] for",
+        "value[i, : length - 1] for",
         "data/test_record.py",
     ),
     Fault(

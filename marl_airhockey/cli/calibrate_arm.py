@@ -83,7 +83,7 @@ def _plot(trials: Sequence[ArmTrial], values: dict[str, Any], path: Path) -> Non
     require("matplotlib", "train")
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.evaluation.charts import DPI, INK, save, tidy
+    from marl_airhockey.render.charts import DPI, INK, save, tidy
 
     f = np.linspace(0.5, 5.0, 200)
     # A critically damped lag: both of its poles lie at this frequency.

@@ -64,7 +64,7 @@ def _plot(found: Delays, path: Path) -> None:
     require("matplotlib", "train")
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.evaluation.charts import DPI, INK, save, tidy
+    from marl_airhockey.render.charts import DPI, INK, save, tidy
 
     figure, panels = plt.subplots(1, 3, figsize=(9, 2.8), dpi=DPI, layout="constrained")
     parts = (found.camera, found.arm, found.round_trip)

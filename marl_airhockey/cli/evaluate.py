@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -34,7 +35,13 @@ from marl_airhockey.cli.real_table import (
     name_on_table,
     real_table,
 )
-from marl_airhockey.evaluation.evaluate import TEST_SEED, EvaluationResult, evaluate
+from marl_airhockey.data.files import is_recording
+from marl_airhockey.evaluation.evaluate import (
+    TEST_SEED,
+    EvaluationResult,
+    evaluate,
+    evaluate_recording,
+)
 from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
@@ -47,8 +54,9 @@ def evaluate_driver(
     driver: Annotated[
         list[str],
         typer.Argument(
-            help="A driver's name or a policy's path; several runs, of different "
-            "seeds, are summed up with an interval over them."
+            help="Name of a driver, path of a policy, or folder of a recording. "
+            "Several runs, of different seeds, are summed up with an interval over "
+            "them."
         ),
     ],
     scenario: Scenario = None,
@@ -74,7 +82,17 @@ def evaluate_driver(
 
     On a real table, or in the virtual lab, the driver plays alone: no floors, and a
     policy does not sample.
+
+    A recording is measured as it was played; options of the environment have no effect.
     """
+    recorded = [is_recording(Path(name)) for name in driver]
+    if all(recorded):
+        _report([evaluate_recording(Path(name)) for name in driver], None, as_json)
+        return
+    if any(recorded):
+        raise ValueError(
+            "recordings and drivers: evaluate them by commands of their own"
+        )
     keywords = environment(
         backend, profile, option, other, physics, control_dt, observe
     )
@@ -110,6 +128,13 @@ def evaluate_driver(
             )
             progress.advance(task)
     runs = OverRuns.of(results[: len(players)]) if len(players) > 1 else None
+    _report(results, runs, as_json)
+
+
+def _report(
+    results: list[EvaluationResult], runs: OverRuns | None, as_json: bool
+) -> None:
+    """Print results, those of the floors after that of the driver."""
     if as_json:
         main_result = results[0].to_json()
         for result in results[1:]:

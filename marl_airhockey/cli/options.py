@@ -12,13 +12,13 @@ from rich.console import Console
 from marl_airhockey.cli.progress import bar, errors
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.physics import load_physics
-from marl_airhockey.evaluation.as_trained import (
+from marl_airhockey.jit.threads import use_threads
+from marl_airhockey.policies.trust import Trust
+from marl_airhockey.rollout.as_trained import (
     as_trained,
     describe_environment,
     seen_in,
 )
-from marl_airhockey.jit.threads import use_threads
-from marl_airhockey.policies.trust import Trust
 from marl_airhockey.world.build import Keywords
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ import typer
 from marl_airhockey.cli.options import Backend
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.evaluation.as_trained import as_trained
 from marl_airhockey.jit import shipped
 from marl_airhockey.jit.cache import used
 from marl_airhockey.registry import (
@@ -28,6 +27,7 @@ from marl_airhockey.registry import (
     scenario_names,
     zoo_names,
 )
+from marl_airhockey.rollout.as_trained import as_trained
 from marl_airhockey.world.build import Keywords, compile_world
 
 

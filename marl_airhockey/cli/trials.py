@@ -31,6 +31,7 @@ from marl_airhockey.cli.real_table import (
     real_table,
 )
 from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.data.files import is_recording
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
 from marl_airhockey.world.build import Keywords
 
@@ -46,7 +47,8 @@ def trials(
         list[str],
         typer.Argument(
             metavar="[METHOD=]POLICY...",
-            help="Drivers and policies; several of a METHOD (its seeds) are one.",
+            help="Drivers and policies, or recordings of their play; several of a "
+            "METHOD (its seeds) are one.",
         ),
     ],
     scenario: ScenarioOption = None,
@@ -73,10 +75,16 @@ def trials(
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare policies on a table: same starts, in turns, the operator blinded."""
+    """Compare policies on a table: same starts, in turns, the operator blinded.
+
+    Recordings are compared as they were played, without new trials.
+    """
     from marl_airhockey.evaluation.trial_sheet import plan_trials
 
     methods = _methods([_on_table(text, backend) for text in policies])
+    if recorded := _recordings(methods):
+        _compare_recordings(recorded, as_json)
+        return
     drivers = {
         name: [make_agent(path) for path in paths] for name, paths in methods.items()
     }
@@ -110,6 +118,33 @@ def trials(
         return
     _show(found, f"{game} on {backend}")
     console.print(f"{sheet.trials_an_hour:.0f} trials an hour; files: {out}")
+
+
+def _recordings(methods: dict[str, list[str]]) -> dict[str, list[Path]]:
+    """Return the recordings of methods; none if these are drivers and policies.
+
+    Raises:
+        ValueError: Some are recordings and some are not.
+    """
+    found = {name: [Path(path) for path in paths] for name, paths in methods.items()}
+    are = [is_recording(path) for paths in found.values() for path in paths]
+    if any(are) and not all(are):
+        raise ValueError("trials: name recordings or policies, not both")
+    return found if all(are) else {}
+
+
+def _compare_recordings(methods: dict[str, list[Path]], as_json: bool) -> None:
+    """Compare methods by recordings of their play, each of one policy."""
+    from marl_airhockey.data.files import shared_head
+    from marl_airhockey.evaluation.comparison import compare
+    from marl_airhockey.evaluation.evaluate import recorded_outcomes
+
+    head = shared_head([path for paths in methods.values() for path in paths])
+    found = compare({n: recorded_outcomes(paths) for n, paths in methods.items()})
+    if as_json:
+        console.print_json(json.dumps(found.to_json()))
+        return
+    _show(found, f"{head['scenario']}, as recorded")
 
 
 def _play(

@@ -64,7 +64,7 @@ def watch(
 
     --host, --port and --browser are those of a recording's page.
     """
-    from marl_airhockey.evaluation.watch import show_episodes
+    from marl_airhockey.rollout.watch import show_episodes
 
     if is_recording(Path(driver)):
         if video is None:
@@ -91,7 +91,9 @@ def watch(
 
 def watch_recording(recording: Path, video: Path) -> None:
     """Write a video of a recording and print its size."""
-    from marl_airhockey.play.video import write_recording_video
+    from marl_airhockey.play.replay import one_episode
+    from marl_airhockey.rollout.replay import Replay
+    from marl_airhockey.rollout.watch import write_replay
 
-    write_recording_video(recording, video)
+    write_replay(Replay(one_episode(recording)), video)
     console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

@@ -125,7 +125,7 @@ class Column(NamedTuple):
 
 
 @dataclass(frozen=True)
-class RecordedEpisode:
+class Episode:
     """Recorded episode of T control steps."""
 
     index: int
@@ -153,4 +153,4 @@ class Recording:
     path: Path
     head: dict[str, Any]
     """Contents of `meta.json`"""
-    episodes: list[RecordedEpisode]
+    episodes: list[Episode]

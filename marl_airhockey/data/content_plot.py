@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from marl_airhockey.core.recording import RecordedEpisode
-from marl_airhockey.core.scene import Scene
+from marl_airhockey.core.recording import Episode
 from marl_airhockey.data.files import shared_head
 from marl_airhockey.data.reader import episodes_of, read_head
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.registry import make_scenario
+from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.types import Array
 
 DRAWN = (
@@ -27,54 +26,6 @@ DRAWN = (
 BINS = 40
 
 
-class Content:
-    """Contents of recordings that are plotted.
-
-    Args:
-        scene: Scene in which they were made.
-        control_dt: Time of a step, s.
-    """
-
-    def __init__(self, scene: Scene, control_dt: float) -> None:
-        self._scene, self._dt = scene, control_dt
-        self.returns: list[float] = []
-        self.seconds: list[float] = []
-        self.gaps: list[float] = []
-        """Times for which a puck was unseen, s"""
-        self.players: Counter[str] = Counter()
-        self._place: list[Array] = []
-        self._speed: list[Array] = []
-
-    def add(self, episode: RecordedEpisode, who: str) -> None:
-        """Add an episode."""
-        columns = episode.columns
-        self.returns.append(float(columns["returns"][-1, 0]))
-        self.seconds.append(len(episode) * self._dt)
-        self.players[who] += 1
-        self._place.append(columns["state.position"])
-        self._speed.append(np.linalg.norm(columns["state.velocity"], axis=-1))
-        if "sensed.visible" in columns:
-            for k in range(self._scene.bodies.pucks):
-                hidden = (~columns["sensed.visible"][:, k]).astype(np.int8)
-                edges = np.diff(np.concatenate([[0], hidden, [0]]))
-                begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-                self.gaps += ((ends - begins) * self._dt).tolist()
-
-    @property
-    def steps(self) -> int:
-        """Number of steps."""
-        return sum(len(place) for place in self._place)
-
-    def places(self, where: slice) -> Array:
-        """Return the positions (n, 2) of some bodies in all steps, m."""
-        parts = [place[:, where].reshape(-1, 2) for place in self._place]
-        return np.concatenate(parts)
-
-    def speeds(self, where: slice) -> Array:
-        """Return the speeds (n,) of some bodies in all steps, m/s."""
-        return np.concatenate([speed[:, where].ravel() for speed in self._speed])
-
-
 def plot_content(paths: Sequence[Path], out: Path) -> None:
     """Write a PNG of what recordings of one scenario hold.
 
@@ -83,39 +34,58 @@ def plot_content(paths: Sequence[Path], out: Path) -> None:
     """
     head = shared_head(paths)
     scene = make_scenario(head["scenario"], **head.get("options", {})).scene
-    found = Content(scene, head["control_dt"])
+    episodes, players = list[Episode](), Counter[str]()
     for path in paths:
         rows = read_head(path).get("players", [])
         who = " / ".join(str(row["person"] or row["driver"]) for row in rows)
-        for episode in episodes_of(path, DRAWN):
-            if len(episode):
-                found.add(episode, who)
-    if not found.steps:
+        found = [episode for episode in episodes_of(path, DRAWN) if len(episode)]
+        players[who] += len(found)
+        episodes += found
+    if not episodes:
         raise ValueError(f"{paths[0]}: there are no steps in it")
     figure, axes = plt.subplots(3, 2, figsize=(9, 9), dpi=DPI, layout="constrained")
-    episodes = len(found.seconds)
-    figure.suptitle(f"{head['scenario']}: {episodes} episodes, {found.steps} steps")
+    steps, dt = sum(map(len, episodes)), head["control_dt"]
+    figure.suptitle(f"{head['scenario']}: {len(episodes)} episodes, {steps} steps")
     bodies = {"paddle": scene.bodies.paddle}
     if scene.bodies.pucks:
         bodies["puck"] = scene.bodies.puck
-    _histogram(axes[0, 0], {"": found.returns}, "return of the first seat")
-    _histogram(axes[0, 1], {"": found.seconds}, "length of an episode, s")
+    returns = [float(episode.columns["returns"][-1, 0]) for episode in episodes]
+    _histogram(axes[0, 0], {"": returns}, "return of the first seat")
+    seconds = [len(episode) * dt for episode in episodes]
+    _histogram(axes[0, 1], {"": seconds}, "length of an episode, s")
     for axis, (name, where) in zip(axes[1], bodies.items(), strict=False):
         half = scene.table.size / 2
         edges = [np.linspace(-h, h, n) for h, n in zip(half, (60, 31), strict=True)]
-        axis.hist2d(*found.places(where).T, bins=edges, cmap="Blues", norm="symlog")
+        positions = _vectors(episodes, "state.position", where)
+        axis.hist2d(*positions.T, bins=edges, cmap="Blues", norm="symlog")
         axis.set(aspect="equal", xlabel="x, m", ylabel="y, m", title=f"{name}: places")
     axes[1, 1].set_visible("puck" in bodies)
-    speeds = {name: found.speeds(where) for name, where in bodies.items()}
+    speeds = {
+        name: np.linalg.norm(_vectors(episodes, "state.velocity", where), axis=-1)
+        for name, where in bodies.items()
+    }
     _histogram(axes[2, 0], speeds, "speed, m/s")
-    last = axes[2, 1]
-    if found.gaps:
-        _histogram(last, {"": found.gaps}, "time for which a puck was unseen, s")
+    last, gaps = axes[2, 1], [gap * dt for e in episodes for gap in _gaps(e)]
+    if gaps:
+        _histogram(last, {"": gaps}, "time for which a puck was unseen, s")
     else:
         last.set_axis_off()
-    names = "\n".join(f"{who}: {n}" for who, n in found.players.most_common(12))
+    names = "\n".join(f"{who}: {n}" for who, n in players.most_common(12))
     last.set_title(f"episodes by player\n{names}", fontsize="small")
     save(figure, out)
+
+
+def _vectors(episodes: Sequence[Episode], name: str, where: slice) -> Array:
+    """Return a column (n, 2) of some bodies in all steps."""
+    return np.concatenate([e.columns[name][:, where].reshape(-1, 2) for e in episodes])
+
+
+def _gaps(episode: Episode) -> Iterator[int]:
+    """Yield the numbers of steps for which a puck was unseen."""
+    visible = episode.columns.get("sensed.visible", np.ones((len(episode), 0), bool))
+    for puck in visible.T:
+        edges = np.diff(np.concatenate([[0], ~puck, [0]]).astype(np.int8))
+        yield from np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
 
 
 def _histogram(axes: Axes, values: Mapping[str, Any], label: str) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.recording import RecordedEpisode
 from marl_airhockey.data.files import shared_head
 from marl_airhockey.data.parquet import read_table, write_table
 from marl_airhockey.data.parts import parts_of
@@ -34,7 +33,7 @@ def repaired(path: Path, out: Path) -> list[str]:
     head, wrong = read_head(path), list[str]()
     with whole_recording(out, head) as writer:
         for episode in episodes_of(path, bad=wrong):
-            copy_episode(writer, episode)
+            writer.write(episode)
         if not writer.episodes:
             words = "; ".join(wrong)
             raise ValueError(f"{path}: no episode of it can be read: {words}")
@@ -51,7 +50,7 @@ def merged(paths: Sequence[Path], out: Path) -> None:
     with whole_recording(out, head) as writer:
         for path in paths:
             for episode in episodes_of(path):
-                copy_episode(writer, episode)
+                writer.write(episode)
 
 
 def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
@@ -73,18 +72,8 @@ def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
     new = (whole_recording(part, head) for part in paths)
     with next(new) as train, next(new) as test:
         for episode in episodes_of(path):
-            copy_episode(test if episode.index in drawn else train, episode)
+            (test if episode.index in drawn else train).write(episode)
     return paths
-
-
-def copy_episode(writer: RecordingWriter, episode: RecordedEpisode) -> None:
-    """Write an episode that was read."""
-    given = episode.seed, episode.number, episode.physics
-    writer.begin(episode.first, *given)
-    if len(episode):
-        writer.add_rows(episode.columns)
-    if episode.reason:
-        writer.end(episode.reason)
 
 
 def resume(path: Path, head: dict[str, object]) -> RecordingWriter:

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from marl_airhockey.core.recording import FILM, Columns, RecordedEpisode
+from marl_airhockey.core.recording import FILM, Columns, Episode
 from marl_airhockey.devices.camera import Film
 from marl_airhockey.types import Array
 
@@ -23,9 +23,7 @@ def film_columns(film: Film) -> Columns:
     return {"frame": np.array([number], np.int64), "frame_taken": np.array([taken])}
 
 
-def episodes_without_film(
-    path: Path, episodes: Iterable[RecordedEpisode]
-) -> dict[int, str]:
+def episodes_without_film(path: Path, episodes: Iterable[Episode]) -> dict[int, str]:
     """Return messages about episodes whose last pictures the film lacks, by episode.
 
     Args:
@@ -40,7 +38,7 @@ def episodes_without_film(
     return {index: words for index, words in gaps.items() if words}
 
 
-def film_gap(path: Path, episode: RecordedEpisode, count: int) -> str:
+def film_gap(path: Path, episode: Episode, count: int) -> str:
     """Return a message if the film ends before an episode; "" if it does not.
 
     Args:

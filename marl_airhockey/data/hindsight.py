@@ -6,18 +6,19 @@ get such a goal, end where it is reached first, and are successes.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from marl_airhockey.contracts.scenario import GoalScenario
-from marl_airhockey.core.recording import PLAYED, Columns, Recording
+from marl_airhockey.core.recording import PLAYED, Columns, Episode, Recording
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches, new_head
-from marl_airhockey.data.replay import Replay
-from marl_airhockey.data.writer import RecordingWriter, whole_recording
+from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.registry import has_goals, make_scenario
+from marl_airhockey.rollout.replay import Replay
 from marl_airhockey.types import Array
 
 ACHIEVED, DESIRED = "observation.achieved_goal", "observation.desired_goal"
@@ -57,31 +58,24 @@ def with_hindsight(
     with whole_recording(out, {**new, "hindsight": copies}) as writer:
         for batch in batches(episodes_of(path)):
             replay = Replay(Recording(path, head, batch), game)
-            before, after = replay.run(_kept)
-            for i, episode in enumerate(batch):
-                first = {name: value[i] for name, value in before.items()}
-                columns = {n: v[i, : len(episode)] for n, v in after.items()}
-                given = episode.seed, episode.number, episode.physics
+            for episode in replay.episodes():
                 for _ in range(copies):
-                    found = _copy(game, first, columns, rng)
+                    found = _copy(game, episode, rng)
                     if found is not None:
-                        _write(writer, *found, given)
+                        writer.write(found)
         if not writer.episodes:
             raise ValueError(f"{path}: no goal of {scenario} was reached in it")
     return out
 
 
-def _kept(name: str) -> bool:
-    return not name.startswith(DROPPED)
-
-
 def _copy(
-    game: GoalScenario, first: Columns, columns: Columns, rng: np.random.Generator
-) -> tuple[Columns, Columns] | None:
+    game: GoalScenario, episode: Episode, rng: np.random.Generator
+) -> Episode | None:
     """Return an episode with another goal; None if it reached none.
 
     A goal must not be met at the start, and it must be one that can be met at all.
     """
+    first, columns = _without_goal(episode.first), _without_goal(episode.columns)
     start, achieved = first[ACHIEVED][0], columns[ACHIEVED][:, 0]
     fits = game.goal_reward(achieved, achieved) > 0
     fits &= game.goal_reward(np.broadcast_to(start, achieved.shape), achieved) == 0
@@ -90,11 +84,17 @@ def _copy(
     goal = achieved[rng.choice(np.flatnonzero(fits))]
     met = game.goal_reward(achieved, np.broadcast_to(goal, achieved.shape)) > 0
     end = int(np.argmax(met)) + 1
-    return {**first, DESIRED: _as(goal, first[DESIRED])}, {
+    columns = {
         **{name: values[:end] for name, values in columns.items()},
         DESIRED: _as(goal, columns[DESIRED][:end]),
         **_ends(met[:end]),
     }
+    first[DESIRED] = _as(goal, first[DESIRED])
+    return replace(episode, first=first, columns=columns, reason=PLAYED)
+
+
+def _without_goal(columns: Columns) -> Columns:
+    return {n: value for n, value in columns.items() if not n.startswith(DROPPED)}
 
 
 def _as(goal: Array, like: Array) -> Array:
@@ -111,11 +111,3 @@ def _ends(met: Array) -> dict[str, Any]:
         "terminated": met,
         "truncated": np.zeros(len(met), np.bool_),
     }
-
-
-def _write(
-    writer: RecordingWriter, first: Columns, columns: Columns, given: tuple[Any, ...]
-) -> None:
-    writer.begin(first, *given)
-    writer.add_rows(columns)
-    writer.end(PLAYED)

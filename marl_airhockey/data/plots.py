@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.data.extract import Trajectories
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.types import Array
 
 

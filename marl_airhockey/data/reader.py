@@ -20,7 +20,7 @@ from marl_airhockey.core.recording import (
     PHYSICS,
     Column,
     Columns,
-    RecordedEpisode,
+    Episode,
     Recording,
 )
 from marl_airhockey.data.parquet import KEYS, columns_of, read_table
@@ -135,7 +135,7 @@ def episodes_of(
     path: str | Path,
     names: Collection[str] | None = None,
     bad: list[str] | None = None,
-) -> Iterator[RecordedEpisode]:
+) -> Iterator[Episode]:
     """Yield the episodes of a recording, of which one at a time is in memory.
 
     Args:
@@ -265,7 +265,7 @@ def _joined(
     rows: list[dict[str, Any]],
     layout: dict[str, Column],
     bad: list[str] | None,
-) -> Iterator[RecordedEpisode]:
+) -> Iterator[Episode]:
     """Yield an episode, if it makes sense."""
     where, whole = f"{path}: episode {pieces.episode}", {}
     if pieces.episode >= len(rows) or pieces.gap:
@@ -283,7 +283,7 @@ def _joined(
             return _complain(words, bad)
     row = rows[pieces.episode]
     complete = row["length"] == pieces.next - 1
-    yield RecordedEpisode(
+    yield Episode(
         index=pieces.episode,
         seed=row.get("seed"),
         number=row.get("number") or 0,

@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.recording import FILM, PLAYED, Columns
-from marl_airhockey.data.columns import (
-    EpisodeNotes,
-    episode_notes,
-    first_columns,
-    head_of,
-    step_columns,
-)
 from marl_airhockey.data.derived import resume
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.devices.camera import Film
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
-from marl_airhockey.types import Array
+from marl_airhockey.rollout.columns import (
+    episode_notes,
+    first_columns,
+    head_of,
+    step_columns,
+)
+from marl_airhockey.rollout.play import play
+from marl_airhockey.rollout.rollout import AT_ONCE, play_episodes
 from marl_airhockey.world.build import Keywords, build_driven_world
 from marl_airhockey.world.world import World
-
-AT_ONCE = 64
-"""Number of episodes that are played in one batch"""
 
 
 def record_episodes(
@@ -79,14 +74,16 @@ def record_episodes(
                 raise ValueError(f"{path}: a film cannot be resumed; name another")
             reel = Film(camera, path / FILM) if camera is not None else None
             try:
-                for first in range(begun, episodes, at_once):
-                    world.reset(seed + first)
-                    done = min(at_once, episodes - first)
-                    if live:
+                if live:
+                    for number in range(begun, episodes):
+                        world.reset(seed + number)
                         _record_live(world, writer, reel)
-                    else:
-                        _record(world, writer, done)
-                    progress(first + done)
+                        progress(number + 1)
+                else:
+                    played = play_episodes(world, episodes - begun, seed + begun)
+                    for done, episode in enumerate(played, begun + 1):
+                        writer.write(episode)
+                        progress(done)
             finally:
                 if reel is not None:
                     reel.close()
@@ -125,9 +122,11 @@ def record_steps(
     left = steps
     try:
         with whole_recording(path, _head(world, name, seed, keywords)) as writer:
-            while left > 0:
-                world.reset(seed + writer.episodes)
-                left -= _record(world, writer, AT_ONCE, left)
+            for episode in play_episodes(world, steps, seed):
+                writer.write(episode)
+                left -= len(episode)
+                if left <= 0:
+                    break
     finally:
         world.close()
     return path
@@ -196,68 +195,8 @@ def _record_live(world: World, writer: RecordingWriter, film: Film | None) -> No
         return {name: value[0] for name, value in shown.items()}
 
     writer.begin(only(first_columns(world)), *episode_notes(world))
-    no_actions, reason, done = np.zeros((1, 0, 2)), PLAYED, False
-    while not done:
-        result = world.step(no_actions)
+    reason = PLAYED
+    for step in play(world):
         writer.add(only(step_columns(world)))
-        reason = result.interruption or reason
-        done = bool(result.terminated[0] or result.truncated[0])
+        reason = step.result.interruption or reason
     writer.end(reason)
-
-
-def _record(
-    world: World,
-    writer: RecordingWriter,
-    count: int,
-    most: int | None = None,
-) -> int:
-    """Play an episode in each world, and write the first ``count`` of them.
-
-    Args:
-        world: Worlds whose episodes have begun.
-        writer: Writer of the recording.
-        count: Number of episodes that are written at most.
-        most: Number of steps after which no further episode is written.
-
-    Returns:
-        Number of steps that were written.
-    """
-    first = first_columns(world)
-    notes = [episode_notes(world, i) for i in range(count)]
-    rows: list[Columns] = []
-    length = np.zeros(world.num_worlds, np.int64)
-    done, no_actions = length > 0, np.zeros((world.num_worlds, 0, 2))
-    while not done[:count].all():
-        result = world.step(no_actions)
-        length[~done] += 1
-        done |= result.terminated | result.truncated
-        rows.append(step_columns(world))
-    if most is not None:
-        count = min(count, 1 + int(np.searchsorted(np.cumsum(length), most)))
-    write_episodes(writer, first, rows, length, notes[:count], [PLAYED] * count)
-    return int(length[:count].sum())
-
-
-def write_episodes(
-    writer: RecordingWriter,
-    first: Columns,
-    rows: Sequence[Columns],
-    lengths: Array,
-    notes: Sequence[EpisodeNotes],
-    reasons: Sequence[str],
-) -> None:
-    """Write episodes that were played side by side.
-
-    Args:
-        writer: Writer of a recording.
-        first: Columns (B, ...) before the first step.
-        rows: Columns (B, ...) after each step.
-        lengths: (B,) number of steps of each episode.
-        notes: Seed and physics of those that are written, the first of the B.
-        reasons: Reason of the end of each of these.
-    """
-    whole = {name: np.stack([row[name] for row in rows], 1) for name in rows[0]}
-    for i, (note, reason) in enumerate(zip(notes, reasons, strict=True)):
-        writer.begin({name: value[i] for name, value in first.items()}, *note)
-        writer.add_rows({n: value[i, : lengths[i]] for n, value in whole.items()})
-        writer.end(reason)

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.recording import PLAYED, Columns, RecordedEpisode, Recording
-from marl_airhockey.data.columns import (
-    SHARED,
-    episode_notes,
-    first_columns,
-    step_columns,
-)
+from marl_airhockey.core.recording import PLAYED, Episode, Recording
 from marl_airhockey.data.reader import episodes_of, read_head
-from marl_airhockey.data.record import AT_ONCE, write_episodes
-from marl_airhockey.data.replay import Replay
-from marl_airhockey.data.writer import RecordingWriter, whole_recording
+from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.registry import make_scenario, scenario_names
+from marl_airhockey.rollout.columns import SHARED
+from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollout.rollout import AT_ONCE
 
 LEFT_OUT = ("columns", "format", "observation_labels", *SHARED)
 """Keys of a head that are not those of the relabelled recording"""
@@ -55,7 +48,8 @@ def relabelled(
     game = make_scenario(scenario, **new["options"])
     with whole_recording(out, new) as writer:
         for batch in batches(episodes_of(path)):
-            _write(Recording(path, head, batch), game, writer)
+            for episode in Replay(Recording(path, head, batch), game).episodes():
+                writer.write(_cut(episode))
     return out
 
 
@@ -105,34 +99,20 @@ def fitting(path: Path) -> list[str]:
     return names
 
 
-def batches(episodes: Iterator[RecordedEpisode]) -> Iterator[list[RecordedEpisode]]:
+def batches(episodes: Iterator[Episode]) -> Iterator[list[Episode]]:
     """Yield some episodes at a time; those without steps are left out."""
     whole = (episode for episode in episodes if len(episode))
     while batch := list(itertools.islice(whole, AT_ONCE)):
         yield batch
 
 
-def _write(recording: Recording, game: Scenario, writer: RecordingWriter) -> None:
-    """Write episodes, replayed side by side under the rules of a scenario."""
-    replay = Replay(recording, game)
-    replay.begin()
-    world, count = replay.world, len(recording.episodes)
-    first, notes = first_columns(world), [episode_notes(world, i) for i in range(count)]
-    rows: list[Columns] = []
-    lengths, done = replay.lengths.copy(), np.zeros(count, np.bool_)
-    for t in range(int(replay.lengths.max())):
-        result = replay.step(t)
-        rows.append(step_columns(world))
-        over = (result.terminated | result.truncated) & ~done
-        lengths = np.where(over, np.minimum(lengths, t + 1), lengths)
-        done |= over | (t + 1 >= replay.lengths)
-        if done.all():
-            break
-    ends = [
-        bool(rows[n - 1]["terminated"][i] | rows[n - 1]["truncated"][i])
-        for i, n in enumerate(lengths)
-    ]
-    for i, n in enumerate(lengths):
-        rows[n - 1]["truncated"][i] |= not ends[i]
-    reasons = [PLAYED if ended else CUT for ended in ends]
-    write_episodes(writer, first, rows, lengths, notes, reasons)
+def _cut(episode: Episode) -> Episode:
+    """Return a replayed episode up to its end by the rules of its scenario."""
+    columns = episode.columns
+    ends = columns["terminated"] | columns["truncated"]
+    ended, length = bool(ends.any()), len(episode)
+    if ended:
+        length = int(ends.argmax()) + 1
+    columns = {name: value[:length] for name, value in columns.items()}
+    columns["truncated"][-1] |= not ended
+    return replace(episode, columns=columns, reason=PLAYED if ended else CUT)

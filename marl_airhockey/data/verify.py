@@ -9,8 +9,8 @@ import numpy as np
 from marl_airhockey.core.recording import Columns, Recording
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches
-from marl_airhockey.data.replay import Replay
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.rollout.replay import Replay
 from marl_airhockey.types import Array
 
 MEASURED = ("clock", "round_trip", "pointer")
@@ -34,10 +34,9 @@ def replay_differences(path: Path) -> dict[str, float]:
             "follow from the states alone; leave out --replay"
         )
     for batch in batches(episodes_of(path)):
-        _, columns = Replay(Recording(path, head, batch)).run()
-        for i, episode in enumerate(batch):
-            own = {name: value[i, : len(episode)] for name, value in columns.items()}
-            for name, off in _differences(own, episode.columns).items():
+        replayed = Replay(Recording(path, head, batch)).episodes()
+        for own, episode in zip(replayed, batch, strict=True):
+            for name, off in _differences(own.columns, episode.columns).items():
                 found[name] = max(found.get(name, 0.0), off)
     return found
 

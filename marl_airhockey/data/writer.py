@@ -22,6 +22,7 @@ from marl_airhockey.core.recording import (
     STEPS,
     Column,
     Columns,
+    Episode,
 )
 from marl_airhockey.data.blocks import Block, DiskWriter
 from marl_airhockey.data.files import parent_of
@@ -191,6 +192,14 @@ class RecordingWriter:
         self._place_first()
         self._episodes[-1]["reason"], self._changed = reason, True
         self._flush_in_time()
+
+    def write(self, episode: Episode) -> None:
+        """Write a whole episode; one without a reason of its end is interrupted."""
+        self.begin(episode.first, episode.seed, episode.number, episode.physics)
+        if len(episode):
+            self.add_rows(episode.columns)
+        if episode.reason:
+            self.end(episode.reason)
 
     def _flush_in_time(self) -> None:
         """Have a thread write what waits; whoever adds steps must not wait for it."""

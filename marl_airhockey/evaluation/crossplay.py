@@ -8,9 +8,9 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from marl_airhockey.evaluation.as_trained import seated_players
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.stats import bootstrap
+from marl_airhockey.rollout.as_trained import seated_players
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 

@@ -26,7 +26,7 @@ class Deployability:
     power_above_5hz: float
     """Share of the actions' power above 5 Hz; nan for control below 10 Hz"""
     act_ms: float
-    """Median CPU time of a decision for one world, ms"""
+    """Median CPU time of a decision for one world, ms; nan of a recording"""
     grade: str
     """A, B, C or D"""
 
@@ -44,12 +44,12 @@ class Deployability:
             control_dt: length of a control step, s.
         """
         bounds = {"A": (0.01, 0.10, 5.0), "B": (0.1, 0.25, 10.0), "C": (0.5, 0.5, 25.0)}
-        high = 0.0 if np.isnan(power) else power
+        high, act = np.nan_to_num([power, act_ms])
         grade = next(
             (
                 name
                 for name, (v, p, ms) in bounds.items()
-                if violations <= v and high <= p and act_ms <= ms
+                if violations <= v and high <= p and act <= ms
             ),
             "D",
         )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -13,20 +12,27 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.evaluation.as_trained import as_trained, seen_in
+from marl_airhockey.data.reader import episodes_of, read_head
+from marl_airhockey.evaluation.comparison import Outcomes
 from marl_airhockey.evaluation.deployability import Deployability
+from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
-from marl_airhockey.types import Array
+from marl_airhockey.rollout.as_trained import as_trained, seen_in
+from marl_airhockey.rollout.columns import head_of
+from marl_airhockey.rollout.rollout import play_episodes
 from marl_airhockey.world.build import (
     Keywords,
     build_driven_world,
+    scenario_of,
     table_keywords,
 )
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000
 """First of the seeds that training never sees"""
+MOST_STEPS = 1 << 21
+"""Most control steps whose columns are in memory together, about 400 MB in a duel"""
 
 
 @dataclass(frozen=True)
@@ -117,41 +123,114 @@ def evaluate(
         raise ValueError("scenario: say what the driver is to play")
     if episodes < 1:
         raise ValueError(f"episodes: {episodes} must be at least 1")
-    name_of_backend = keywords.get("backend", DEFAULT_BACKEND)
-    # On a real table episodes follow each other; elsewhere all are played at once.
-    at_once = 1 if find_backend(name_of_backend).senses_itself else episodes
+    # On a real table episodes follow each other; elsewhere many are played at once.
+    real = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
+    game, dt = scenario_of(scenario, keywords), keywords.get("control_dt", 0.05)
+    cycles = keywords.get("max_cycles") or round(game.seconds / dt)
+    at_once = 1 if real else min(episodes, max(MOST_STEPS // cycles, 1))
     world = build_driven_world(driver, scenario, at_once, keywords)
-    statistics = EpisodeStatistics(episodes)
     try:
-        for first in range(0, episodes, at_once):
-            statistics.play(world, seed + first, slice(first, first + at_once))
-        deployability = statistics.deployability(world)
+        played = play_episodes(world, episodes, seed, COLUMNS)
+        statistics = EpisodeStatistics(played, world.control_dt)
+        head, act_ms = head_of(world, keywords), _act_ms(world)
     finally:
         world.close()
-    success = float(statistics.success.mean())
+    head |= {"observe": driver.observe or head["observe"], "first_seed": seed}
+    others = {k: str(v) for k, v in keywords.get("drivers", {}).items()}
+    return _result(statistics, act_ms, head, name, others)
+
+
+def evaluate_recording(path: Path) -> EvaluationResult:
+    """Measure the first seat of a recording, as it was played.
+
+    Args:
+        path: Recording of a simulation, of a match on a page or of a real table.
+
+    Raises:
+        ValueError: No recording, one without steps, or one that lacks a column.
+    """
+    head, statistics = read_head(path), recorded_statistics(path)
+    players = [str(row["person"] or row["driver"]) for row in head.get("players", [])]
+    others = {f"paddle_{i}": name for i, name in enumerate(players) if i}
+    driver = players[0] if players else path.name
+    return _result(statistics, float("nan"), head, driver, others)
+
+
+def recorded_statistics(path: Path) -> EpisodeStatistics:
+    """Return the statistics of the episodes of a recording.
+
+    Raises:
+        ValueError: No recording, one without steps, or one that lacks a column.
+    """
+    dt = float(read_head(path)["control_dt"])
+    try:
+        found = EpisodeStatistics(episodes_of(path, COLUMNS), dt)
+    except KeyError as error:
+        raise ValueError(f"{path}: there is no column {error} in it") from error
+    if not len(found.success):
+        raise ValueError(f"{path}: there are no steps in it")
+    return found
+
+
+def recorded_outcomes(paths: Sequence[Path]) -> Outcomes:
+    """Return the outcomes of a method from recordings, each of one of its policies.
+
+    Raises:
+        ValueError: See `recorded_statistics`.
+    """
+    found = [recorded_statistics(path) for path in paths]
+    lengths = [len(each.success) for each in found]
+    return Outcomes(
+        policy=np.repeat(np.arange(len(found)), lengths),
+        success=np.concatenate([each.success for each in found]).astype(float),
+        returns=np.concatenate([each.returns for each in found]),
+        interrupted=np.concatenate([each.interrupted for each in found]).astype(float),
+    )
+
+
+def _result(
+    statistics: EpisodeStatistics,
+    act_ms: float,
+    head: Mapping[str, Any],
+    driver: str,
+    drivers: dict[str, str],
+) -> EvaluationResult:
+    """Return the result of episodes.
+
+    Args:
+        statistics: Statistics of the episodes.
+        act_ms: CPU time of a decision, ms; nan if it is not known.
+        head: Head of their recording, which describes the environment.
+        driver: Name of the driver that is measured.
+        drivers: Names of the drivers of other seats, by agent.
+    """
+    episodes, success = len(statistics.success), float(statistics.success.mean())
+    dt, returns = float(head["control_dt"]), statistics.returns
     return EvaluationResult(
-        driver=name,
-        scenario=world.scenario.name,
-        backend=keywords.get("backend", DEFAULT_BACKEND),
-        profile=keywords.get("profile", "ideal"),
+        driver=driver,
+        scenario=head["scenario"],
+        backend=str(head.get("backend", DEFAULT_BACKEND)),
+        profile=str(head.get("profile", "ideal")),
         episodes=episodes,
         success=success,
         success_interval=interval(success, episodes),
         first_shot=float(statistics.first_shot.mean()),
-        returns=float(statistics.returns.mean()),
-        returns_iqm=iqm(statistics.returns),
-        returns_interval=bootstrap(statistics.returns, iqm),
+        returns=float(returns.mean()),
+        returns_iqm=iqm(returns),
+        returns_interval=bootstrap(returns, iqm),
         length=float(statistics.length.mean()),
-        hits=float(statistics.hits.mean()),
-        deployability=deployability,
-        interrupted=len(statistics.interruptions),
-        interruptions=dict(Counter(statistics.interruptions).most_common()),
-        observe=driver.observe or world.observer.observe,
-        control_dt=world.control_dt,
-        options=dict(keywords.get("options", {})),
-        physics=keywords.get("physics"),
-        drivers={k: str(v) for k, v in keywords.get("drivers", {}).items()},
-        seed=seed,
+        hits=float(statistics.touches.mean()),
+        deployability=Deployability.of(
+            statistics.violations, statistics.jerk, statistics.high_power, act_ms, dt
+        ),
+        interrupted=statistics.interruptions.total(),
+        interruptions=dict(statistics.interruptions.most_common()),
+        observe=str(head.get("observe", "")),
+        control_dt=dt,
+        options=dict(head.get("options", {})),
+        physics=head.get("physics"),
+        drivers=drivers,
+        seed=int(head.get("first_seed", 0)),
     )
 
 
@@ -160,92 +239,6 @@ def name_of(player: object, driver: Driver) -> str:
     if isinstance(player, (str, Path)):
         return str(player)
     return str(getattr(driver, "source", type(driver).__name__))
-
-
-class EpisodeStatistics:
-    """Statistics of episodes, and of ``paddle_0`` in them.
-
-    Args:
-        episodes: number of them.
-    """
-
-    def __init__(self, episodes: int) -> None:
-        self.success, self.first_shot = np.zeros((2, episodes), np.bool_)
-        self.returns, self.length, self.hits = np.zeros((3, episodes))
-        self.interruptions: list[str] = []
-        """Reasons of the episodes that a real table had to end."""
-        self._violations = 0
-        self._jerks: list[Array] = []
-        self._actions: list[Array] = []
-        """Actions (steps, 2) of each episode, nan after its end"""
-
-    def play(self, world: World, seed: int, rows: slice) -> None:
-        """Play an episode in each of B worlds, and keep it in B rows."""
-        world.reset(seed)
-        b, dt = world.num_worlds, world.control_dt
-        done, no_actions = np.zeros(b, np.bool_), np.zeros((b, 0, 2))
-        last, last_command = np.zeros((2, b, 2))
-        actions: list[Array] = []
-        while not done.all():
-            result, live = world.step(no_actions), ~done
-            self.length[rows] += live
-            self._violations += int(((result.violation[:, 0, -1] > 0) & live).sum())
-            command = world.command[:, 0]
-            acceleration = (command - last_command) / dt
-            self._jerks.append(((acceleration - last)[live] / dt).ravel())
-            last, last_command = acceleration, command
-            actions.append(np.where(live[:, None], world.action[:, 0], np.nan))
-            ended = (result.terminated | result.truncated) & live
-            self._end(world, ended, rows)
-            if result.interruption:
-                self.interruptions.append(result.interruption)
-            done |= ended
-        self._actions += list(np.stack(actions, 1))
-
-    def _end(self, world: World, ended: Array, rows: slice) -> None:
-        """Keep what the episodes that ended have come to."""
-        episode = world.episode
-        if np.isnan(episode.returns).any():
-            bad = [name for name, term in world.terms.items() if np.isnan(term).any()]
-            raise ValueError(f"{world.scenario.name}: reward terms {bad} are nan")
-        self.success[rows][ended] = episode.success[ended, 0]
-        self.first_shot[rows][ended] = episode.first_shot[ended]
-        self.returns[rows][ended] = episode.returns[ended, 0]
-        if "touches" in world.memory:
-            self.hits[rows][ended] = world.memory["touches"].sum((-1, -2))[ended]
-
-    def deployability(self, world: World) -> Deployability:
-        """Return the driver's fitness for a real arm."""
-        dt = world.control_dt
-        return Deployability.of(
-            self._violations / max(self.length.sum(), 1),
-            self._rms_jerk(),
-            self._power_above(5.0, dt),
-            _act_ms(world),
-            dt,
-        )
-
-    def _rms_jerk(self) -> float:
-        """Return the root mean square of the commands' jerk, m/s3."""
-        jerks = np.concatenate(self._jerks)
-        return float(np.sqrt((jerks**2).mean()))
-
-    def _power_above(self, frequency: float, dt: float) -> float:
-        """Return the share of the actions' power above a frequency, Hz.
-
-        It is nan if the frequency is not below half of the control rate.
-        """
-        if 0.5 / dt <= frequency:
-            return float("nan")
-        high = total = 0.0
-        for action in self._actions:
-            series = action[np.isfinite(action[:, 0])]
-            if len(series) < 8:
-                continue
-            power = np.abs(np.fft.rfft(series - series.mean(0), axis=0)) ** 2
-            above = np.fft.rfftfreq(len(series), dt) > frequency
-            high, total = high + power[above].sum(), total + power.sum()
-        return float(high / total) if total > 0 else 0.0
 
 
 def _act_ms(world: World) -> float:

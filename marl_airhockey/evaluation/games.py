@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import count
 
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.rollout.play import play
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_world, scenario_of
 from marl_airhockey.world.roster import Roster
@@ -135,25 +135,19 @@ def play_games(
     first = [int(np.flatnonzero(teams == team)[0]) for team in range(teams.max() + 1)]
     won, margin = np.zeros(lineups.shape, np.bool_), np.zeros(lineups.shape)
     lasted = np.full(lineups.shape, np.inf)
-    seconds, playing = np.zeros(games), np.ones(games, np.bool_)
-    actions = np.zeros((games, len(teams), 2))
-    for step_number in count(1):
-        roster.ask(actions)
-        step = world.step(actions)
+    seconds = np.zeros(games)
+    for number, step in enumerate(play(world, roster.ask), 1):
         eliminated, now = world.eliminated, world.state.time[:, None]
         if eliminated is not None:
             out = np.stack(
                 [eliminated[:, teams == t].all(-1) for t in np.unique(teams)], 1
             )
-            out &= playing[:, None]
+            out &= step.live[:, None]
             lasted = np.where(out, np.minimum(lasted, now), lasted)
-        ended = playing & (step.terminated | step.truncated)
+        ended = step.ended
         won[ended] = world.episode.success[ended][:, first]
         margin[ended] = world.episode.returns[ended][:, first]
         seconds[ended] = world.state.time[ended]
-        playing &= ~ended
-        report(step_number / world.max_cycles)
-        if not playing.any():
-            break
+        report(number / world.max_cycles)
     world.close()
     return GameResults(won, margin, lasted, seconds)

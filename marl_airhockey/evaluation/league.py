@@ -9,11 +9,11 @@ from typing import Unpack
 
 import numpy as np
 
-from marl_airhockey.evaluation.as_trained import seated_players
 from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.policies.runs import policies_of
+from marl_airhockey.rollout.as_trained import seated_players
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, scenario_of
 

@@ -16,8 +16,10 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.state import State
-from marl_airhockey.evaluation.evaluate import TEST_SEED, EpisodeStatistics
+from marl_airhockey.evaluation.evaluate import TEST_SEED
+from marl_airhockey.evaluation.measures import COLUMNS, measure
 from marl_airhockey.evaluation.trial_sheet import TrialRow, TrialSheet
+from marl_airhockey.rollout.rollout import play_episodes
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.world import World
@@ -62,21 +64,22 @@ def play_trials(
             if trial < len(sheet.rows):
                 continue
             world.driven[0] = seats[name, k]
-            found, began = EpisodeStatistics(1), datetime.now(UTC)
-            found.play(world, plan.starts[start], slice(0, 1))
+            began = datetime.now(UTC)
+            (episode,) = play_episodes(world, 1, plan.starts[start], COLUMNS)
+            found = measure(episode, world.control_dt)
             sheet.add(
                 TrialRow(
                     trial=trial,
                     start=start,
                     code=plan.codes[name],
                     policy=k,
-                    success=int(found.success[0] and not found.interruptions),
-                    returns=float(found.returns[0]),
-                    seconds=float(found.length[0] * world.control_dt),
-                    touches=float(found.hits[0]),
+                    success=int(found.success),
+                    returns=found.returns,
+                    seconds=found.length * world.control_dt,
+                    touches=found.touches,
                     began=began.isoformat(timespec="milliseconds"),
                     ended=datetime.now(UTC).isoformat(timespec="milliseconds"),
-                    reason="; ".join(found.interruptions),
+                    reason=found.interruption,
                 )
             )
         done(len(plan.trials))

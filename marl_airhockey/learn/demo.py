@@ -9,13 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
-from marl_airhockey.evaluation.watch import show_episodes
 from marl_airhockey.learn.plots import plot_learning_curve
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import run_training, versions
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
+from marl_airhockey.rollout.watch import show_episodes
 
 BESIDE = ("still", "random", "striker")
 """Agents that the learned policy is compared with"""

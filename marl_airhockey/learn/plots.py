@@ -7,8 +7,11 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, PALE, plot_iqm, save, tidy
+from marl_airhockey.evaluation.stats import bootstrap, iqm
+from marl_airhockey.render.charts import DPI, INK, INKS, PALE, save, tidy
+from marl_airhockey.types import Array
 
 
 def plot_learning_curve(
@@ -49,7 +52,7 @@ def plot_learning_curve(
 def plot_seed_curves(
     runs: Mapping[str, Sequence[Sequence[Mapping[str, str]]]], path: Path
 ) -> None:
-    """Draw success against CPU-seconds, a panel for each task, by `charts.plot_iqm`.
+    """Draw success against CPU-seconds, a panel for each task, by `plot_iqm`.
 
     Args:
         runs: rows of each seed, by task: ``cpu_seconds`` of learning and ``success``.
@@ -83,3 +86,12 @@ def plot_seed_curves(
     figure.supxlabel("CPU-seconds of learning, without evaluations")
     figure.supylabel("success")
     save(figure, path)
+
+
+def plot_iqm(axes: Axes, x: Array, runs: Array, ink: str, label: str = "") -> None:
+    """Draw the interquartile mean of runs (runs, points) and its 95 % interval."""
+    points = np.asarray(runs).T
+    middle = [iqm(point) for point in points]
+    low, high = np.transpose([bootstrap(point, resamples=400) for point in points])
+    axes.fill_between(x, low, high, color=ink, alpha=0.18, linewidth=0)
+    axes.plot(x, middle, color=ink, label=label)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.recording import META, PLAYED, RecordedEpisode, Recording
+from marl_airhockey.core.recording import META, PLAYED, Episode, Recording
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.data.columns import scenario_of
 from marl_airhockey.data.reader import read_head, read_recording
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.measures import Player, measure
+from marl_airhockey.rollout.columns import scenario_of
 
 FOREIGN = (
     *(ValueError, TypeError, KeyError, IndexError, AttributeError),
@@ -138,7 +138,7 @@ def _players(head: Mapping[str, Any]) -> Iterable[Player]:
 
 
 def _result(
-    players: Sequence[Player], scene: Scene, episode: RecordedEpisode
+    players: Sequence[Player], scene: Scene, episode: Episode
 ) -> list[tuple[str, str, float]]:
     """Count a game that was played to the end, for each player and each pair."""
     teams = [seat.team for seat in scene.seats]

@@ -10,10 +10,10 @@ import numpy as np
 from marl_airhockey.contracts.observable import OBSERVE
 from marl_airhockey.core.recording import Columns
 from marl_airhockey.core.seat import Seat
-from marl_airhockey.data.columns import first_columns
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
+from marl_airhockey.rollout.columns import first_columns
 from marl_airhockey.world.build import Keywords, build_world
 from marl_airhockey.world.step_result import StepResult
 from marl_airhockey.world.world import World

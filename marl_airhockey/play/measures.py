@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from marl_airhockey.core.limits import VIOLATIONS
-from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.core.recording import Episode
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.types import Array
 
@@ -49,7 +49,7 @@ class Player:
         return Player(self.name, self.person, **both)
 
 
-def measure(player: Player, i: int, scene: Scene, episode: RecordedEpisode) -> None:
+def measure(player: Player, i: int, scene: Scene, episode: Episode) -> None:
     """Add the measurements of an episode to a player.
 
     Args:

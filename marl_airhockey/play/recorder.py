@@ -18,13 +18,13 @@ import numpy as np
 
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.recording import FILM, Columns
-from marl_airhockey.data.columns import episode_notes, head_of, step_columns
 from marl_airhockey.data.files import new_recording
 from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.parquet import EXTRA, warm_up
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.devices.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
+from marl_airhockey.rollout.columns import episode_notes, head_of, step_columns
 
 
 class Recorder:

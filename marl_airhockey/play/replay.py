@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.recording import RecordedEpisode, Recording
-from marl_airhockey.data.columns import memories_of, scenario_of, states_of
+from marl_airhockey.core.recording import Episode, Recording
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.messages import description, drawn, events
+from marl_airhockey.rollout.columns import memories_of, scenario_of, states_of
 
 
-def one_episode(path: Path, number: int = 0) -> tuple[Recording, RecordedEpisode]:
-    """Read a recording and return one of its episodes, which has steps.
+def one_episode(path: Path, number: int = 0) -> Recording:
+    """Read a recording and return it with one of its episodes, which has steps.
 
     Raises:
         ValueError: no recording, or no such episode in it.
@@ -28,7 +29,7 @@ def one_episode(path: Path, number: int = 0) -> tuple[Recording, RecordedEpisode
     episode = recording.episodes[number]
     if not len(episode):
         raise ValueError(f"{path}: there are no steps in it")
-    return recording, episode
+    return replace(recording, episodes=[episode])
 
 
 def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
@@ -40,8 +41,9 @@ def replay_of(path: Path, number: int = 0) -> dict[str, Any]:
     Raises:
         ValueError: no recording, no such episode, or one of another version.
     """
-    recording, episode = one_episode(path, number)
-    scenario, head = scenario_of(recording), recording.head
+    recording = one_episode(path, number)
+    (episode,), head = recording.episodes, recording.head
+    scenario = scenario_of(recording)
     try:
         steps = frames_of(episode, scenario)
     except (ValueError, KeyError, IndexError) as error:
@@ -65,7 +67,7 @@ def _players(head: dict[str, Any]) -> list[dict[str, Any]]:
     return rows if isinstance(rows, list) and listed else []
 
 
-def frames_of(episode: RecordedEpisode, scenario: Scenario) -> list[dict[str, Any]]:
+def frames_of(episode: Episode, scenario: Scenario) -> list[dict[str, Any]]:
     """Return the frames (T + 1) of an episode, as `LiveMatch.state` has them."""
     states, memories = states_of(episode, scenario), memories_of(episode)
     seats = len(scenario.scene.seats)

@@ -8,7 +8,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.study.plan import SCALE_POINTS
 
 

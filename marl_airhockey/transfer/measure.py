@@ -92,7 +92,7 @@ def plot_transfer(rows: Sequence[EvaluationResult], path: Path) -> None:
     """Draw success by policy: a panel for each profile, a colour for each backend."""
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
+    from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
 
     profiles = list(dict.fromkeys(row.profile for row in rows))
     backends = list(dict.fromkeys(row.backend for row in rows))

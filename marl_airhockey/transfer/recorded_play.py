@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.core.recording import Columns
 from marl_airhockey.core.scene import Scene
-from marl_airhockey.data.columns import scenario_of
 from marl_airhockey.data.reader import read_recording
+from marl_airhockey.rollout.columns import scenario_of
+from marl_airhockey.rollout.rollout import play_episodes
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import Keywords, build_driven_world
 
@@ -57,43 +59,37 @@ class RecordedPlay:
         return np.array(starts, np.int64)
 
 
+COLUMNS = ("state.position", "state.velocity", "command")
+
+
 def record_play(
     scenario: str, driver: Driver, steps: int, seed: int, keywords: Keywords
 ) -> RecordedPlay:
     """Let a driver play ``steps`` control steps in one world and record them.
 
     Args:
-        scenario: name of the scenario.
-        driver: at ``paddle_0`` and at the seats of its team.
-        steps: control steps.
-        seed: seed of the first episode.
-        keywords: keywords of the environment.
+        scenario: Name of the scenario.
+        driver: Driver at ``paddle_0`` and at the seats of its team.
+        steps: Number of control steps.
+        seed: Seed of the first episode.
+        keywords: Keywords of the environment.
     """
     world = build_driven_world(driver, scenario, 1, keywords)
-    world.reset(seed)
-    no_actions = np.zeros((1, 0, 2))
-    rows: list[tuple[Array, Array, Array, bool]] = []
-    first_of_episode = True
-    for _ in range(steps):
-        result = world.step(no_actions)
-        position = world.state.position[0].copy()
-        velocity = world.state.velocity[0].copy()
-        command = world.command[0].copy()
-        rows.append((position, velocity, command, not first_of_episode))
-        first_of_episode = bool(result.terminated[0] or result.truncated[0])
-        if first_of_episode:
-            world.reset()
-    scene, dt = world.scene, world.control_dt
+    episodes, left = [], steps
+    for episode in play_episodes(world, steps, seed, COLUMNS):
+        episodes.append({n: value[:left] for n, value in episode.columns.items()})
+        left -= len(episode)
+        if left <= 0:
+            break
     world.close()
-    columns = (np.array(column) for column in zip(*rows, strict=True))
-    return RecordedPlay(scene, dt, *columns)
+    return _joined(world.scene, world.control_dt, episodes)
 
 
 def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
     """Read recordings.
 
     Raises:
-        ValueError: no recordings, or recordings of several scenarios.
+        ValueError: No recordings, or recordings of several scenarios.
     """
     recordings = [read_recording(path) for path in paths]
     names = {recording.head["scenario"] for recording in recordings}
@@ -105,14 +101,13 @@ def load_recordings(paths: Sequence[Path]) -> RecordedPlay:
         )
     scenario = scenario_of(recordings[0])
     episodes = [e.columns for r in recordings for e in r.episodes if len(e)]
-    parts = [
-        (
-            columns["state.position"],
-            columns["state.velocity"],
-            columns["command"],
-            np.arange(len(columns["command"])) > 0,
-        )
-        for columns in episodes
-    ]
-    columns = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return RecordedPlay(scenario.scene, recordings[0].head["control_dt"], *columns)
+    return _joined(scenario.scene, recordings[0].head["control_dt"], episodes)
+
+
+def _joined(scene: Scene, dt: float, episodes: Sequence[Columns]) -> RecordedPlay:
+    """Return episodes one after the other."""
+    position, velocity, command = (
+        np.concatenate([episode[name] for episode in episodes]) for name in COLUMNS
+    )
+    follows = [np.arange(len(episode["command"])) > 0 for episode in episodes]
+    return RecordedPlay(scene, dt, position, velocity, command, np.concatenate(follows))

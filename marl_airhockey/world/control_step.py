@@ -19,7 +19,7 @@ from marl_airhockey.jit.fused import Sink
 from marl_airhockey.jit.pipeline import Pipeline, Stage
 from marl_airhockey.types import Array, Memory
 from marl_airhockey.world.actions import Inputs
-from marl_airhockey.world.episode import Episode
+from marl_airhockey.world.episode import EpisodeCounters
 from marl_airhockey.world.observer import Observer
 from marl_airhockey.world.referee import Referee, Step, Verdict
 
@@ -35,7 +35,7 @@ class Moment(NamedTuple):
     rate: Array
     """Acceleration of the servos (B, S, 2), m/s2"""
     verdict: Verdict
-    episode: Episode
+    episode: EpisodeCounters
     """Counters, those of the verdict among them"""
     shown: Sink
     """Observations of all seats from the true state, see `Observer.stage`"""
@@ -85,7 +85,7 @@ class ControlStep:
         observer: Observer,
         reach: ReachPlanes,
         limit: Array,
-        episode: Episode,
+        episode: EpisodeCounters,
         state: State,
         memory: Memory,
         lags: bool = False,
@@ -121,7 +121,7 @@ class ControlStep:
         self._now = 1 - self._now
         return self._moments[self._now]
 
-    def _moment(self, state: State, memory: Memory, episode: Episode) -> Moment:
+    def _moment(self, state: State, memory: Memory, episode: EpisodeCounters) -> Moment:
         """Return a moment with arrays of its own, filled as by a step of no time."""
         here, b = self._backend.empty_state(), len(self._limit)
         here.write(np.arange(b), state)

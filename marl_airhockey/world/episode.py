@@ -29,7 +29,7 @@ class PhysicsRows(Mapping[str, Array]):
 
 
 @dataclass(frozen=True)
-class Episode:
+class EpisodeCounters:
     """Counters of the running episodes, (B, ...) each."""
 
     number: Array
@@ -46,9 +46,9 @@ class Episode:
     """Physical parameters, (B,) each"""
 
     @staticmethod
-    def empty(worlds: int, seats: int) -> Episode:
+    def empty(worlds: int, seats: int) -> EpisodeCounters:
         """Return counters at zero, of no episode yet."""
-        return Episode(
+        return EpisodeCounters(
             number=np.zeros(worlds, np.int64),
             cycles=np.zeros(worlds, np.int64),
             returns=np.zeros((worlds, seats)),
@@ -57,11 +57,11 @@ class Episode:
             physics={},
         )
 
-    def counted(self, counters: dict[str, Array]) -> Episode:
+    def counted(self, counters: dict[str, Array]) -> EpisodeCounters:
         """Return the same with other arrays for some counters."""
         return replace(self, **counters)  # type: ignore[arg-type]
 
-    def copied(self) -> Episode:
+    def copied(self) -> EpisodeCounters:
         """Return the same with arrays of its own, but for the physics."""
         names = [f.name for f in fields(self) if f.name != "physics"]
         return self.counted({name: getattr(self, name).copy() for name in names})

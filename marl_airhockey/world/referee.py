@@ -12,7 +12,7 @@ from marl_airhockey.core.state import State
 from marl_airhockey.jit.fused import Fused, Sink, Source
 from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.episode import Episode
+from marl_airhockey.world.episode import EpisodeCounters
 
 
 class Verdict(NamedTuple):
@@ -22,7 +22,7 @@ class Verdict(NamedTuple):
     terms: dict[str, Array]
     """Reward terms by name, (B, seats) each"""
     counters: dict[str, Array]
-    """New counters of `Episode`, by name"""
+    """New counters of `EpisodeCounters`, by name"""
     outcome: dict[str, Array]
     """``reward`` (B, seats), ``terminated``, ``truncated``, ``serves`` (B,), if the
     game serves, and ``applied_action`` (B, seats, 2) float32: fractions of top speed in
@@ -38,7 +38,7 @@ class Step(NamedTuple):
     after: State
     memory: Memory
     """Memory of before the step"""
-    episode: Episode
+    episode: EpisodeCounters
     """Counters of before the step"""
     limit: Array
     """(B,) control steps after which the clock ends an episode"""

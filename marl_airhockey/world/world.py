@@ -34,7 +34,7 @@ from marl_airhockey.world.actions import Actions
 from marl_airhockey.world.control_step import ControlStep, Moment
 from marl_airhockey.world.driven_seat import DrivenSeat
 from marl_airhockey.world.elements import DragRegions, check_elements, clear_start
-from marl_airhockey.world.episode import Episode, PhysicsRows
+from marl_airhockey.world.episode import EpisodeCounters, PhysicsRows
 from marl_airhockey.world.known import Known
 from marl_airhockey.world.observer import Observation, Observer, duplicate, put
 from marl_airhockey.world.placement import check_placement
@@ -99,7 +99,7 @@ class World(WorldSpaces):
         self._scatters = physics.any_of(*SCATTER)
         contact = ("contact",) if self._scatters else ()
         self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
-        self._episode = Episode.empty(b, len(seats))
+        self._episode = EpisodeCounters.empty(b, len(seats))
         self._state, self._memory = scene.still_state(b), Memory()
         self._sensed = self._best = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
@@ -142,7 +142,7 @@ class World(WorldSpaces):
         return self._known.copied()
 
     @property
-    def episode(self) -> Episode:
+    def episode(self) -> EpisodeCounters:
         """Counters of the running episodes; freshly allocated, but for the physics."""
         return self._episode.copied()
 

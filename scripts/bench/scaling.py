@@ -26,8 +26,8 @@ from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.registry import find_backend
+from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
 
 Steps = Callable[[], tuple[float, int]]
 """Function that steps for a moment and returns CPU-seconds and calls"""

@@ -27,8 +27,10 @@ import typer
 
 from marl_airhockey.cli.options import settings
 from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.evaluation.evaluate import TEST_SEED, EpisodeStatistics
+from marl_airhockey.evaluation.evaluate import TEST_SEED
+from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.rollout.rollout import play_episodes
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import build_driven_world
 
@@ -135,8 +137,8 @@ def play(driver: Blind, task: str, profile: str, seed: int) -> EpisodeStatistics
     world = build_driven_world(
         driver, task, count, {"profile": profile, "options": driver.options}
     )
-    found = EpisodeStatistics(count)
-    found.play(world, seed, slice(0, count))
+    played = play_episodes(world, count, seed, COLUMNS)
+    found = EpisodeStatistics(played, world.control_dt)
     world.close()
     return found
 

@@ -24,15 +24,16 @@ from rich.table import Table
 
 from marl_airhockey.cli.league import SCRIPTS
 from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.evaluation.charts import DPI, INK, INKS, plot_iqm, save, tidy
 from marl_airhockey.evaluation.crossplay import crossplay
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.learn.plots import plot_iqm
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play_config import OPPONENTS
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
+from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.world.build import Keywords
 
 COOPERATIVE = ("rally", "team_juggle")
@@ -107,7 +108,7 @@ def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
 
 
 def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Draw scores against rivals over CPU-minutes of training, by `charts.plot_iqm`."""
+    """Draw scores against rivals over CPU-minutes of training, by `plot_iqm`."""
     runs = []
     for folder in folders:
         with (folder / "evaluations.csv").open() as file:

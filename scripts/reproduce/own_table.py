@@ -35,15 +35,14 @@ from marl_airhockey.evaluation.comparison import (
     Outcomes,
     compare,
 )
-from marl_airhockey.evaluation.evaluate import (
-    TEST_SEED,
-    EpisodeStatistics,
-)
+from marl_airhockey.evaluation.evaluate import TEST_SEED
+from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.lab.world import LabWorld
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
+from marl_airhockey.rollout.rollout import play_episodes
 from marl_airhockey.world.build import Keywords, build_driven_world
 
 OPTIONS = {"table": LabSetup().table}
@@ -69,14 +68,16 @@ def train_one(task: str, profile: str, seed: int, folder: Path) -> Path:
 
 def play(task: str, runs: list[Path], keywords: Keywords) -> Outcomes:
     """Return the outcomes of policies, each in the same episodes."""
-    found = EpisodeStatistics(EPISODES * len(runs))
-    for k, run in enumerate(runs):
+    found = []
+    for run in runs:
         world = build_driven_world(load_policy(run), task, EPISODES, keywords)
-        found.play(world, TEST_SEED, slice(k * EPISODES, (k + 1) * EPISODES))
+        played = play_episodes(world, EPISODES, TEST_SEED, COLUMNS)
+        found.append(EpisodeStatistics(played, world.control_dt))
         world.close()
     policy = np.repeat(np.arange(len(runs)), EPISODES)
-    success = found.success.astype(float)
-    return Outcomes(policy, success, found.returns, np.zeros(len(policy)))
+    success = np.concatenate([each.success for each in found]).astype(float)
+    returns = np.concatenate([each.returns for each in found])
+    return Outcomes(policy, success, returns, np.zeros(len(policy)))
 
 
 def print_laws(profile: str, laws: dict[str, float]) -> None:

@@ -15,6 +15,7 @@ import typer
 import marl_airhockey as ah
 from marl_airhockey.render.picture import draw
 from marl_airhockey.render.renderer import Renderer
+from marl_airhockey.rollout.play import play
 from marl_airhockey.types import Array
 
 COLUMNS = 2
@@ -34,11 +35,10 @@ def moment(name: str, width: int) -> Array:
     world.autoreset = False
     world.reset(2)
     renderer = Renderer(world, "rgb_array", name.replace("_", " "))
-    over = False
-    while not over and world.state.time[0] < MOMENT:
-        step = world.step(np.zeros((1, 0, 2)))
-        over = bool(step.terminated[0] or step.truncated[0])
+    for _ in play(world):
         renderer.follow()
+        if world.state.time[0] >= MOMENT:
+            break
     x, y = world.scene.table.size
     return draw(renderer.frame(), width if x > WIDE * y else round(0.54 * width))
 

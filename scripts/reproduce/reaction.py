@@ -19,6 +19,7 @@ from rich.table import Table
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.rollout import play as episodes
 
 HOME, FAR = (
     ["allround", "striker", "allround"],
@@ -51,21 +52,18 @@ def play(
     world.reset(SEED)
     goals, shots = np.zeros((2, games, 2))
     minutes, banked, banks = np.zeros((3, games))
-    playing = np.ones(games, np.bool_)
-    while playing.any():
-        before = world.memory["goals"].sum(-1)
-        step = world.step(np.zeros((games, 0, 2)))
-        state = world.state
+    before = world.memory["goals"].sum(-1)
+    for step in episodes.play(world):
+        state, now = world.state, world.memory["goals"].sum(-1)
         banked[state.touched.any((1, 2))] = 0.0
         banked += state.banked[:, 0, [1, 3]].sum(-1)
-        scored = playing & (world.memory["goals"].sum(-1) > before)
+        scored, before = step.live & (now > before), now
         banks += scored & (banked > 0.0)
         banked[scored] = 0.0
-        ended = playing & (step.terminated | step.truncated)
+        ended = step.ended
         goals[ended] = world.memory["goals"][ended]
         shots[ended] = goals[ended] + world.memory["stopped"][ended]
         minutes[ended] = state.time[ended] / 60.0
-        playing &= ~ended
     world.close()
     level = float((goals[:, 0] == goals[:, 1]).mean())
     low, high = interval(level, games)

@@ -33,6 +33,7 @@ from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.lab.emulated_robot import EmulatedRobot
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.policies.load import load_policy
+from marl_airhockey.rollout import play as episodes_of
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import build_driven_world
 
@@ -139,9 +140,10 @@ def play(task: str, player: EmulatedPlayer, episodes: int) -> int:
     for episode in range(episodes):
         world.reset(TEST_SEED + episode)
         ended = False
-        while not (ended or player.stopped):
-            result = world.step(np.zeros((1, 0, 2)))
-            ended = bool(result.terminated[0] | result.truncated[0])
+        for step in episodes_of.play(world):
+            ended = bool(step.ended[0])
+            if player.stopped:
+                break
         successes += bool(ended and world.episode.success[0, 0])
         player.end()
     world.close()

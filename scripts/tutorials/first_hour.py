@@ -18,7 +18,9 @@ import typer
 import marl_airhockey as ah
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
-from marl_airhockey.play.video import write_recording_video
+from marl_airhockey.play.replay import one_episode
+from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollout.watch import write_replay
 
 
 def look() -> None:
@@ -69,7 +71,7 @@ def keep(run: Path, folder: Path) -> None:
     policy, path = ah.load_policy(run), folder / "recording"
     record_episodes(policy, "mine", "touch", 20, path, 0, {})
     steps = sum(len(episode) for episode in read_recording(path).episodes)
-    write_recording_video(path, folder / "touch.gif")
+    write_replay(Replay(one_episode(path)), folder / "touch.gif")
     print(f"{path}: {steps} steps; {folder / 'touch.gif'}")
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from marl_airhockey.data.columns import scenario_of
 from marl_airhockey.data.hindsight import ACHIEVED, DESIRED, with_hindsight
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.registry import make_agent
+from marl_airhockey.rollout.columns import scenario_of
 
 
 def recorded(folder, scenario, driver, episodes=8, **keywords):

@@ -136,7 +136,6 @@ def test_sentences_of_the_readme_are_those_of_the_rows():
 def test_the_table_of_speed_is_that_of_its_run():
     found = json.loads((DATA / "speed.json").read_text())
     shown = table("README.md", "ours / this")
-    agents = {"env-steps": "env_steps_per_cpu_s"}
     for row, run in zip(shown, found, strict=True):
         _, *cells = [cell.strip("*") for cell in row.values()]
         rates = [run["env_steps_per_cpu_s"], run["agent_steps_per_cpu_s"]]

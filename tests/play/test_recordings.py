@@ -15,9 +15,10 @@ from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.plots import plot_report
 from marl_airhockey.play.protocol import RateLimiter
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.play.replay import replay_of
+from marl_airhockey.play.replay import one_episode, replay_of
 from marl_airhockey.play.report import summarize
-from marl_airhockey.play.video import write_recording_video
+from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollout.watch import write_replay
 
 DEVICE = {"input": "mouse", "width": 1000, "height": 600, "density": 2.0, "hz": 60.0}
 
@@ -53,7 +54,7 @@ def test_an_episode_is_recorded_step_by_step(tmp_path):
     assert recording.head["devices"] == [DEVICE, None]
     end = episode.columns["state.position"][-1]
     np.testing.assert_array_equal(end, match.world.state.position[0])
-    write_recording_video(path, tmp_path / "game.gif")
+    write_replay(Replay(one_episode(path)), tmp_path / "game.gif")
     with Image.open(tmp_path / "game.gif") as video:
         assert video.n_frames == RATE
 

@@ -1,10 +1,8 @@
 """What every scenario owes, on every backend; found by folder, listed nowhere."""
 
-import inspect
 import subprocess
 import sys
 import types
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -20,7 +18,6 @@ from pettingzoo.test import (
     state_test,
 )
 from pettingzoo.utils.conversions import parallel_to_aec
-from rollout import rollout
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
@@ -29,6 +26,7 @@ from marl_airhockey.core.state import ARRAYS
 from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import term_meanings
 from marl_airhockey.evaluation.evaluate import evaluate
+from marl_airhockey.rollout.rollout import play_episodes
 
 CHANCE = {"still": 0.02, "random": 0.10, "sticky": 0.10}
 
@@ -92,18 +90,23 @@ def test_gymnasium_and_sb3_checks(scenario, backend):
 
 def test_the_same_seed_gives_the_same_episodes_in_another_process():
     program = (
-        "import sys, hashlib; sys.path.insert(0, sys.argv[1])\n"
+        "import hashlib\n"
         "import marl_airhockey as ah\n"
-        "from rollout import rollout\n"
         "for name in ah.scenario_names():\n"
         "    for backend in ('numba', 'pymunk'):\n"
-        "        world = ah.make_world(name, 3, backend=backend)\n"
-        "        parts = rollout(world, 150 if backend == 'numba' else 30, 7)\n"
-        "        data = b''.join(part.tobytes() for part in parts)\n"
+        "        steps = 150 if backend == 'numba' else 30\n"
+        "        seats = range(1, len(ah.make_scenario(name).scene.seats))\n"
+        "        drivers = {f'paddle_{k}': 'random' for k in seats}\n"
+        "        episodes = ah.rollout(\n"
+        "            'random', name, episodes=3, seed=7, backend=backend,\n"
+        "            max_cycles=steps, drivers=drivers\n"
+        "        )\n"
+        "        data = b''.join(\n"
+        "            v.tobytes() for e in episodes for v in e.columns.values()\n"
+        "        )\n"
         "        print(name, backend, hashlib.sha256(data).hexdigest())\n"
     )
-    helpers = str(Path(inspect.getfile(rollout)).parent)
-    command = [sys.executable, "-c", program, helpers]
+    command = [sys.executable, "-c", program]
     runs = [
         subprocess.run(command, capture_output=True, text=True, check=True).stdout
         for _ in range(2)
@@ -113,12 +116,14 @@ def test_the_same_seed_gives_the_same_episodes_in_another_process():
 
 
 def test_a_reset_with_the_same_seed_forgets_what_was_played(scenario, backend):
-    world = ah.make_world(scenario, 2, backend=backend)
-    first = rollout(world, 120, 3, policy_seed=1)
-    rollout(world, 77, 9, policy_seed=2)
-    again = rollout(world, 120, 3, policy_seed=1)
-    for a, b in zip(first, again, strict=True):
-        np.testing.assert_array_equal(a, b)
+    seats = range(len(ah.make_scenario(scenario).scene.seats))
+    drivers = {f"paddle_{k}": "random" for k in seats}
+    world = ah.make_world(scenario, 2, backend=backend, drivers=drivers, max_cycles=120)
+    world.autoreset = False
+    first, _, again = (list(play_episodes(world, 2, seed)) for seed in (3, 9, 3))
+    for one, other in zip(first, again, strict=True):
+        for name, value in one.columns.items():
+            np.testing.assert_array_equal(value, other.columns[name], name)
 
 
 def test_a_row_of_many_worlds_equals_a_single_world(scenario, backend):

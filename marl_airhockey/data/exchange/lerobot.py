@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import FILM, Columns, RecordedEpisode
+from marl_airhockey.core.recording import FILM, Columns, Episode
 from marl_airhockey.data.exchange.lerobot_writer import (
     LeRobotWriter,
 )
@@ -97,7 +97,7 @@ def _names(head: Mapping[str, Any], seat: int) -> dict[str, list[str]]:
     return names
 
 
-def _frames(path: Path, episode: RecordedEpisode, seat: int) -> tuple[Columns, Columns]:
+def _frames(path: Path, episode: Episode, seat: int) -> tuple[Columns, Columns]:
     """Return the features (T, ...) of an episode, and its last observation."""
     columns, shown = episode.columns, {}
     for part, values in observations_of(path, episode).items():
@@ -131,7 +131,7 @@ def _frames(path: Path, episode: RecordedEpisode, seat: int) -> tuple[Columns, C
     return frames, {name: values[-1] for name, values in shown.items()}
 
 
-def _film(path: Path, episode: RecordedEpisode) -> tuple[Path, Array] | tuple[()]:
+def _film(path: Path, episode: Episode) -> tuple[Path, Array] | tuple[()]:
     """Return the film of an episode and its frame (T,) for each step, if it has one."""
     if "frame" not in episode.columns or not (path / FILM).exists():
         return ()

@@ -13,11 +13,11 @@ from marl_airhockey.core.physics import Physics
 from marl_airhockey.core.recording import Columns, Recording
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.state import RESULTS, Kind
-from marl_airhockey.data.columns import SENSED, STATE, scenario_of
 from marl_airhockey.data.exchange.measured_events import Path, fill_events
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.registry import make_scenario
+from marl_airhockey.rollout.columns import SENSED, STATE, scenario_of
 from marl_airhockey.types import Array
 
 BEYOND = 0.1

@@ -21,7 +21,7 @@ import gymnasium
 import numpy as np
 
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import PLAYED, RecordedEpisode
+from marl_airhockey.core.recording import PLAYED, Episode
 from marl_airhockey.data.benchmark.catalogue import PROFILE
 from marl_airhockey.data.benchmark.content import references
 from marl_airhockey.data.exchange.seats import (
@@ -162,7 +162,7 @@ def _env_spec(head: Mapping[str, Any], seat: int | None) -> Any:
 
 
 def _buffer(
-    number: int, path: Path, episode: RecordedEpisode, seat: int | None
+    number: int, path: Path, episode: Episode, seat: int | None
 ) -> EpisodeBuffer:
     """Return an episode as Minari takes it."""
     from minari.data_collector import EpisodeBuffer
@@ -201,7 +201,7 @@ def _single(values: Array) -> Array:
     return np.ascontiguousarray(values, np.float32)
 
 
-def _infos(episode: RecordedEpisode, seat: int | None) -> dict[str, Any]:
+def _infos(episode: Episode, seat: int | None) -> dict[str, Any]:
     """Return the infos (T + 1, ...), those of the reset first."""
     found: dict[str, Any] = {"state": {}}
     for name in STATE:

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.recording import PLAYED, Columns, RecordedEpisode
-from marl_airhockey.data.columns import SENSED, STATE
+from marl_airhockey.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.data.exchange.measured import (
     Measured,
     interpolated,
@@ -30,6 +29,7 @@ from marl_airhockey.data.exchange.seats import (
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.writer import whole_recording
+from marl_airhockey.rollout.columns import SENSED, STATE
 from marl_airhockey.types import Array
 
 PUCK, PADDLE = ("t", "x", "y"), ("paddle_x", "paddle_y")
@@ -143,7 +143,7 @@ def export_rows(
     return final
 
 
-def _write(file: Path, episode: RecordedEpisode, seat: int) -> None:
+def _write(file: Path, episode: Episode, seat: int) -> None:
     known = episode.columns
     time = MOMENT if MOMENT in known else STATE + "time"
     names = [time, STATE + "position"]

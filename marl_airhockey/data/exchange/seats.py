@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.core.recording import Episode
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.make import parallel_env
 from marl_airhockey.types import Array
@@ -22,7 +22,7 @@ OBSERVATION = "observation"
 
 def episodes_with_steps(
     files: Sequence[Path],
-) -> Iterator[tuple[Path, RecordedEpisode]]:
+) -> Iterator[tuple[Path, Episode]]:
     """Yield the episodes of recordings, each with its recording's path.
 
     Raises:
@@ -38,7 +38,7 @@ def episodes_with_steps(
         raise ValueError(f"{files[0]}: there are no steps in it")
 
 
-def observations_of(path: Path, episode: RecordedEpisode) -> dict[str, Array]:
+def observations_of(path: Path, episode: Episode) -> dict[str, Array]:
     """Return the observations (T + 1, seats, D) by part; of flat ones, the part is "".
 
     Raises:
@@ -52,7 +52,7 @@ def observations_of(path: Path, episode: RecordedEpisode) -> dict[str, Array]:
     return {name.partition(".")[2]: all_rows(episode, name) for name in names}
 
 
-def all_rows(episode: RecordedEpisode, name: str) -> Array:
+def all_rows(episode: Episode, name: str) -> Array:
     """Return a column (T + 1, ...) with its value before the first step.
 
     Raises:
@@ -63,7 +63,7 @@ def all_rows(episode: RecordedEpisode, name: str) -> Array:
     return np.concatenate([episode.first[name][None], episode.columns[name]])
 
 
-def check_seat(episode: RecordedEpisode, seat: int) -> None:
+def check_seat(episode: Episode, seat: int) -> None:
     """Refuse a seat that an episode does not have.
 
     Raises:
@@ -74,7 +74,7 @@ def check_seat(episode: RecordedEpisode, seat: int) -> None:
         raise ValueError(f"--seat {seat}: the recording has {seats}")
 
 
-def cut_off(episode: RecordedEpisode) -> tuple[Array, Array]:
+def cut_off(episode: Episode) -> tuple[Array, Array]:
     """Return `terminated` and `truncated` (T,) of an episode.
 
     The last step of an interrupted episode is truncated.

@@ -19,7 +19,7 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import PLAYED, Columns, RecordedEpisode
+from marl_airhockey.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.data.exchange.measured import (
     Measured,
     measured_head,
@@ -238,15 +238,13 @@ def export_trajectories(
     return final
 
 
-def _kept_fields(episode: RecordedEpisode) -> Columns:
+def _kept_fields(episode: Episode) -> Columns:
     """Return the fields (T + 1, n) of the file that an episode comes from, if any."""
     names = [n for n in (*FIELDS, TAIL) if ROBOT + n in episode.columns]
     return {name: all_rows(episode, ROBOT + name) for name in names}
 
 
-def _fields(
-    number: int, episode: RecordedEpisode, seat: int, rotation: Array
-) -> Columns:
+def _fields(number: int, episode: Episode, seat: int, rotation: Array) -> Columns:
     """Return the fields (T + 1, n) made of the states of an episode."""
     position = all_rows(episode, "state.position")
     velocity = all_rows(episode, "state.velocity")

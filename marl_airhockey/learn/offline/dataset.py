@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from marl_airhockey.core.recording import RecordedEpisode
+from marl_airhockey.core.recording import Episode
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.learn.offline.choice import best_of
 from marl_airhockey.types import Array
@@ -99,16 +99,14 @@ def load_dataset(
     return Dataset(steps, scale)
 
 
-def _episodes(files: Sequence[Path]) -> Iterator[tuple[Path, RecordedEpisode]]:
+def _episodes(files: Sequence[Path]) -> Iterator[tuple[Path, Episode]]:
     for path in files:
         for episode in episodes_of(path, NEEDED):
             if len(episode):
                 yield path, episode
 
 
-def _seat_of(
-    path: Path, episode: RecordedEpisode, seat: int, size: int
-) -> dict[str, Array]:
+def _seat_of(path: Path, episode: Episode, seat: int, size: int) -> dict[str, Array]:
     """Return the steps of a seat in an episode."""
     columns, where = episode.columns, f"{path}: episode {episode.index}"
     names = ("observation",) if "observation" in columns else GOALS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -15,7 +15,7 @@ import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.physics import load_physics
-from marl_airhockey.core.recording import Columns, RecordedEpisode, Recording
+from marl_airhockey.core.recording import Columns, Episode, Recording
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
 from marl_airhockey.types import Memory
@@ -83,42 +83,71 @@ def episode_notes(world: World, row: int = 0) -> EpisodeNotes:
     return EpisodeNotes(int(world.seeds[row]), int(episode.number[row]), physics)
 
 
-def first_columns(world: World) -> Columns:
-    """Return the columns (B, ...) of what is there now: state, memory, observation."""
+def first_columns(world: World, names: Collection[str] | None = None) -> Columns:
+    """Return the columns (B, ...) of what is there now: state, memory, observation.
+
+    Args:
+        world: Worlds whose episodes have begun.
+        names: Names of the columns that are wanted; None for all.
+    """
+    return _columns(BEFORE, world, names)
+
+
+def step_columns(world: World, names: Collection[str] | None = None) -> Columns:
+    """Return the columns (B, ...) of the step that was made last.
+
+    Args:
+        world: Worlds that have made a step.
+        names: Names of the columns that are wanted; None for all.
+    """
+    return _columns(BEFORE, world, names) | _columns(AFTER, world, names)
+
+
+def _columns(
+    sources: Mapping[str, Callable[[World], Columns]],
+    world: World,
+    names: Collection[str] | None,
+) -> Columns:
+    """Return the columns of sources; what is not wanted is not computed either."""
+    found: Columns = {}
+    for beginnings, source in sources.items():
+        if names is None or any(n.startswith(tuple(beginnings.split())) for n in names):
+            found |= source(world)
+    return found if names is None else {n: v for n, v in found.items() if n in names}
+
+
+def _states(world: World) -> Columns:
     state = world.state
     columns = {STATE + name: getattr(state, name) for name in RESULTS}
-    if state.path is not None:
-        columns[STATE + PATH] = state.path
+    return columns | ({} if state.path is None else {STATE + PATH: state.path})
+
+
+def _sensed(world: World) -> Columns:
+    columns: Columns = {}
     if not world.sensor.ideal:
         sensed = world.sensed
         columns |= {SENSED + name: getattr(sensed, name) for name in SEEN}
         columns[f"{SENSED}age"] = world.sensor.age
     if world.backend.senses_itself:
-        columns[f"{SENSED}visible"] = state.visible
-    columns |= {MEMORY + name: value for name, value in world.memory.items()}
+        columns[f"{SENSED}visible"] = world.state.visible
+    return columns
+
+
+def _memories(world: World) -> Columns:
+    return {MEMORY + name: value for name, value in world.memory.items()}
+
+
+def _observations(world: World) -> Columns:
     if world.observer.observe == "pixels":
-        return columns
+        return {}
     shown = world.observe(np.arange(len(world.scene.seats)))
     if isinstance(shown, Mapping):
-        return columns | {f"observation.{k}": v for k, v in shown.items()}
-    return columns | {"observation": shown}
+        return {f"observation.{k}": v for k, v in shown.items()}
+    return {"observation": shown}
 
 
-def step_columns(world: World) -> Columns:
-    """Return the columns (B, ...) of the step that was made last."""
-    outcome, episode = world.outcome, world.episode
-    return {
-        **first_columns(world),
-        "action": world.requested,
-        "delayed_action": world.action,
-        "command": world.command,
-        **outcome,
-        **{TERM + name: value for name, value in world.terms.items()},
-        "returns": episode.returns,
-        "success": episode.success,
-        **_judged(world),
-        **_devices(world),
-    }
+def _terms(world: World) -> Columns:
+    return {TERM + name: value for name, value in world.terms.items()}
 
 
 def _judged(world: World) -> Columns:
@@ -130,13 +159,35 @@ def _judged(world: World) -> Columns:
 
 
 def _devices(world: World) -> Columns:
-    """Return the numbers that devices of a real table tell, (1, ...) each."""
+    """Return the numbers that devices of a real table report, (1, ...) each."""
     numbers = world.backend.telemetry()
     return {
         f"device.{name}": np.array([np.nan if value is None else value], np.float64)
         for name, value in numbers.items()
         if not isinstance(value, str)
     }
+
+
+BEFORE: Mapping[str, Callable[[World], Columns]] = {
+    STATE: _states,
+    SENSED: _sensed,
+    MEMORY: _memories,
+    "observation": _observations,
+}
+"""Sources of the columns that exist before the first step, too, by the beginnings of
+their names"""
+AFTER: Mapping[str, Callable[[World], Columns]] = {
+    "action": lambda world: {"action": world.requested},
+    "delayed_action": lambda world: {"delayed_action": world.action},
+    "command": lambda world: {"command": world.command},
+    "reward applied_action terminated truncated violation": lambda world: world.outcome,
+    TERM: _terms,
+    "returns": lambda world: {"returns": world.episode.returns},
+    "success": lambda world: {"success": world.episode.success},
+    JUDGED: _judged,
+    "device.": _devices,
+}
+"""Sources of the columns of a step"""
 
 
 def scenario_of(recording: Recording) -> Scenario:
@@ -168,7 +219,7 @@ def scenario_of(recording: Recording) -> Scenario:
     return scenario
 
 
-def states_of(episode: RecordedEpisode, scenario: Scenario) -> State:
+def states_of(episode: Episode, scenario: Scenario) -> State:
     """Return the states (T + 1, ...) of an episode, that before the first step first.
 
     Raises:
@@ -188,13 +239,13 @@ def states_of(episode: RecordedEpisode, scenario: Scenario) -> State:
     return replace(still, **fields)
 
 
-def memories_of(episode: RecordedEpisode) -> Memory:
+def memories_of(episode: Episode) -> Memory:
     """Return the scenario's memories (T + 1, ...) of an episode."""
     names = [n for n in episode.first if n.startswith(MEMORY)]
     return {n.removeprefix(MEMORY): _joined(episode, n) for n in names}
 
 
-def _joined(episode: RecordedEpisode, name: str) -> Any:
+def _joined(episode: Episode, name: str) -> Any:
     """Return a column with its first value before it.
 
     Raises:

@@ -8,7 +8,7 @@ against the rules of today.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -17,21 +17,20 @@ import numpy as np
 from marl_airhockey.contracts.backend import Backend, Command
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.recording import Columns, RecordedEpisode, Recording
+from marl_airhockey.core.recording import Episode, Recording
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.scene import Scene
 from marl_airhockey.core.state import RESULTS, State
-from marl_airhockey.data.columns import (
+from marl_airhockey.jit.pipeline import Stage
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.rollout.collector import Collector
+from marl_airhockey.rollout.columns import (
     JUDGED,
     PATH,
     STATE,
-    first_columns,
     scenario_of,
     states_of,
-    step_columns,
 )
-from marl_airhockey.jit.pipeline import Stage
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.types import Array
 from marl_airhockey.world.step_result import StepResult
 from marl_airhockey.world.world import World
@@ -134,6 +133,7 @@ class Replay:
         """Worlds of the episodes, all seats open"""
         self._seeds = [episode.seed or 0 for episode in episodes]
         self._numbers = np.array([episode.number for episode in episodes])
+        self._reasons = [episode.reason for episode in episodes]
 
     def begin(self) -> None:
         """Begin all episodes."""
@@ -145,29 +145,22 @@ class Replay:
         """Make step t (from 0); episodes that have ended keep their last state."""
         return self.world.step(self._actions[t])
 
-    def run(
-        self, keep: Callable[[str], bool] = lambda name: True
-    ) -> tuple[Columns, Columns]:
-        """Replay all episodes and return their columns.
+    def episodes(self, names: Collection[str] | None = None) -> Iterator[Episode]:
+        """Replay all episodes and yield each, as long as it was recorded.
 
         Args:
-            keep: Function that says which columns are returned, by name.
-
-        Returns:
-            Columns (B, ...) before the first step, and (B, T, ...) after each; those
-            after an episode's end repeat its last state.
+            names: Names of the columns that are computed, as far as the worlds have
+                them; None for all.
         """
         self.begin()
-        first = {n: v for n, v in first_columns(self.world).items() if keep(n)}
-        rows = []
+        collector = Collector(self.world, names)
         for t in range(int(self.lengths.max())):
             self.step(t)
-            columns = step_columns(self.world)
-            rows.append({n: np.array(v) for n, v in columns.items() if keep(n)})
-        return first, {n: np.stack([row[n] for row in rows], 1) for n in rows[0]}
+            collector.add()
+        yield from collector.episodes(self.lengths, self._reasons)
 
 
-def judged_states(episode: RecordedEpisode, states: State, scenario: Scenario) -> State:
+def judged_states(episode: Episode, states: State, scenario: Scenario) -> State:
     """Return the states (T, ...) that the rules judged: those before serves.
 
     Args:
@@ -207,7 +200,7 @@ def _check_scene(game: Scenario, own: Scenario) -> None:
 
 def _physics(
     head: dict[str, object],
-    episodes: Sequence[RecordedEpisode],
+    episodes: Sequence[Episode],
     game: Scenario,
     played: type[Backend],
 ) -> Physics:

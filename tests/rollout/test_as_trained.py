@@ -8,8 +8,8 @@ from command import airhockey
 from runs import SMALL
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.as_trained import as_trained, describe_environment
 from marl_airhockey.registry import make_agent
+from marl_airhockey.rollout.as_trained import as_trained, describe_environment
 
 GENTLE = """
 from dataclasses import dataclass

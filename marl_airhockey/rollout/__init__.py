@@ -1,0 +1,1 @@
+"""Rollouts: the loop over control steps, and the episodes that come of it."""

@@ -1,0 +1,109 @@
+"""Episodes of a driver or of a recording, in a window or as a video."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.render.renderer import TOP, Renderer
+from marl_airhockey.render.video import check_ending, width_of, write_video
+from marl_airhockey.rollout.play import play
+from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.types import Array
+from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.world import World
+
+FINAL_HOLD = 0.7
+"""Time, s, for which a video rests on the last image of an episode"""
+RATE = 30.0
+"""Largest number of images a second in the video of a recording"""
+
+
+def show_episodes(
+    scenario: str | Scenario,
+    driver: Driver,
+    keywords: Keywords,
+    seed: int = 0,
+    episodes: int = 1,
+    video: Path | None = None,
+    width: int | None = None,
+    seconds: float = float("inf"),
+    viewpoint: str = TOP,
+) -> list[Array]:
+    """Play some episodes with ``driver`` at ``paddle_0`` and show them.
+
+    Args:
+        scenario: Name of the scenario, or a scenario object.
+        driver: Driver that plays.
+        keywords: Keywords of the environment.
+        seed: Seed of the first episode.
+        episodes: Number of episodes.
+        video: .gif, .webp or .mp4 to write; None opens a window.
+        width: Width of the video, px; None for that of its kind of file.
+        seconds: Time after which an episode is cut, s.
+        viewpoint: "top", or one of the backend's viewpoints.
+
+    Returns:
+        The images (H, W, 3) uint8 of the video; an empty list for a window.
+
+    Raises:
+        RuntimeError: There is no screen for a window.
+        ValueError: A video with another ending.
+    """
+    if video is None and not any(
+        os.environ.get(k) for k in ("DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER")
+    ):
+        raise RuntimeError("there is no screen here: use --video FILE.gif or FILE.mp4")
+    if video is not None:
+        check_ending(video)
+    width = width or width_of(video or "")
+    world = build_driven_world(driver, scenario, 1, keywords)
+    mode = "human" if video is None else "rgb_array"
+    renderer = Renderer(world, mode, _title(world), viewpoint=viewpoint)
+    fps = 1 / world.control_dt
+    images: list[Array] = []
+    for episode in range(episodes):
+        world.reset(seed if episode == 0 else None)
+        renderer.begin()
+        for _ in play(world):
+            renderer.follow()
+            if video is not None:
+                images.append(renderer.take_picture(width))
+            if world.state.time[0] >= seconds:
+                break
+        images += images[-1:] * round(FINAL_HOLD * fps)
+    if video is not None:
+        write_video(video, images, fps)
+    renderer.close()
+    world.close()
+    return images
+
+
+def write_replay(replay: Replay, video: Path, width: int | None = None) -> None:
+    """Write a video of a recorded episode.
+
+    Args:
+        replay: Replay of one episode.
+        video: .gif, .webp or .mp4 to write.
+        width: Width of the images, px; None for that of the kind of file.
+
+    Raises:
+        ValueError: A video with another ending.
+    """
+    check_ending(video)
+    world, width = replay.world, width or width_of(video)
+    renderer = Renderer(world, "rgb_array", _title(world))
+    every, images = max(round(1.0 / (RATE * world.control_dt)), 1), list[Array]()
+    replay.begin()
+    for t in range(int(replay.lengths[0])):
+        replay.step(t)
+        renderer.follow()
+        if (t + 1) % every == 0:
+            images.append(renderer.take_picture(width))
+    write_video(video, images, 1 / (every * world.control_dt))
+
+
+def _title(world: World) -> str:
+    return world.scenario.name.replace("_", " ")
