@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
     from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
-    from marl_airhockey.world.build import Keywords
+    from marl_airhockey.world.keywords import Keywords
     from marl_airhockey.world.world import World
 
 
@@ -89,9 +89,9 @@ def make_vec(
         **keywords: See `build.build_world`.
     """
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
-    from marl_airhockey.world.build import check_names
+    from marl_airhockey.world.keywords import check_keywords
 
-    check_names(keywords)
+    check_keywords(keywords)
     modes = autoreset_mode, render_mode
     return AirHockeyVectorEnv(scenario, num_worlds, *modes, **keywords)
 

@@ -13,6 +13,7 @@ from marl_airhockey.toolkit import (
     Mark,
     Memory,
     Metres,
+    Pucks,
     RandomStreams,
     Scenario,
     Scene,
@@ -34,8 +35,8 @@ class Juggle(Scenario):
     """
 
     seconds: Seconds = 15.0
-    pucks: int = 1
-    """Number of pucks, 1 or 2."""
+    pucks: Pucks = 1
+    """Number of pucks."""
     lift: Metres = 0.3
     """Height to which a hit must raise the puck's centre (m)."""
     hits: int = 4

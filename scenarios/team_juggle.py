@@ -13,6 +13,7 @@ from marl_airhockey.toolkit import (
     Mark,
     Memory,
     Metres,
+    Pucks,
     RandomStreams,
     Scenario,
     Scene,
@@ -37,7 +38,7 @@ class TeamJuggle(Scenario):
     """
 
     seconds: Seconds = 30.0
-    pucks: int = 1
+    pucks: Pucks = 1
     """Number of pucks."""
     lift: Metres = 0.2
     """Height to which a hit must raise the puck's centre (m)."""

@@ -31,9 +31,9 @@ def challenge(
     name: Annotated[
         str | None, typer.Option(help="Name on the card; else POLICY.")
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the card.")] = Path(
-        "runs/challenge"
-    ),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the card.")
+    ] = Path("runs/challenge"),
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:

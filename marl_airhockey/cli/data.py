@@ -44,7 +44,9 @@ def record(
     episodes: Annotated[int, typer.Option(help="How many.", min=1)] = 100,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the recording; recordings/TIME-SCENARIO."),
+        typer.Option(
+            file_okay=False, help="Folder of the recording; recordings/TIME-SCENARIO."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
     observe: Annotated[
@@ -204,7 +206,10 @@ def check(
 def report(
     folder: Annotated[Path, typer.Argument(help="Of recordings.")],
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the report; the recordings' own.")
+        Path | None,
+        typer.Option(
+            file_okay=False, help="Folder of the report; the recordings' own."
+        ),
     ] = None,
     scenario: Annotated[
         str | None, typer.Option("--scenario", "-s", help="Of this one alone.")

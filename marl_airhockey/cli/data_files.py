@@ -15,7 +15,7 @@ from marl_airhockey.core.errors import require
 
 def repair(
     recording: Annotated[Path, typer.Argument(help="Recording.")],
-    out: Annotated[Path, typer.Option(help="Folder of the new one.")],
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the new one.")],
 ) -> None:
     """Write the good episodes of a recording as a new one; the old one stays."""
     from marl_airhockey.data.derived import repaired
@@ -29,19 +29,23 @@ def merge(
     paths: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders of them.")
     ],
-    out: Annotated[Path, typer.Option(help="Folder of the new recording.")],
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the new recording.")
+    ],
 ) -> None:
     """Write recordings of one kind as one recording."""
     from marl_airhockey.data.derived import merged
-    from marl_airhockey.data.files import recordings_in
+    from marl_airhockey.data.files import whole_recordings_in
 
-    merged(recordings_in(paths), out)
+    merged(whole_recordings_in(paths), out)
     show([out], False)
 
 
 def split(
     recording: Annotated[Path, typer.Argument(help="Recording.")],
-    out: Annotated[Path, typer.Option(help="Folder of the two: train and test.")],
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the two: train and test.")
+    ],
     test: Annotated[
         float, typer.Option(help="Fraction of the episodes that go to test.")
     ] = 0.1,
@@ -56,7 +60,9 @@ def split(
 
 def relabel(
     recording: Annotated[Path, typer.Argument(help="Recording.")],
-    out: Annotated[Path, typer.Option(help="Folder of the new recordings.")],
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the new recordings.")
+    ],
     task: Annotated[
         list[str] | None,
         typer.Option(help="Scenario, repeatable; all that fit if none is given."),
@@ -94,7 +100,8 @@ def extract(
         Path | None, typer.Option(help="File of the table's devices; the recording's.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of CSV and plot; the video's own.")
+        Path | None,
+        typer.Option(file_okay=False, help="Folder of CSV and plot; the video's own."),
     ] = None,
 ) -> None:
     """Find where puck and paddle were in each picture; write a CSV and a plot."""
@@ -136,14 +143,16 @@ def export(
     ] = 0,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of all datasets; Minari's own, else datasets."),
+        typer.Option(
+            file_okay=False, help="Folder of all datasets; Minari's, else datasets."
+        ),
     ] = None,
 ) -> None:
     """Write recordings as a dataset that others load without this library."""
     from marl_airhockey.data.exchange.formats import find_format
-    from marl_airhockey.data.files import recordings_in, size_of
+    from marl_airhockey.data.files import size_of, whole_recordings_in
 
-    files = recordings_in(paths)
+    files = whole_recordings_in(paths)
     chosen = None if seat < 0 else seat
     folder = find_format(to).export(files, name, out, chosen)
     console.print(f"wrote {folder} ({size_of(folder) / 1e6:.1f} MB)", soft_wrap=True)
@@ -161,11 +170,17 @@ def import_dataset(
         str, typer.Option("--scenario", "-s", help="Scenario that it is of.")
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the recording; recordings/SOURCE.")
+        Path | None,
+        typer.Option(
+            file_okay=False, help="Folder of the recording; recordings/SOURCE."
+        ),
     ] = None,
     option: Options = None,
     root: Annotated[
-        Path | None, typer.Option(help="Folder of all Minari datasets; Minari's own.")
+        Path | None,
+        typer.Option(
+            file_okay=False, help="Folder of all Minari datasets; Minari's own."
+        ),
     ] = None,
     control_dt: Annotated[
         float,

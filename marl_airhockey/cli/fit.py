@@ -16,7 +16,7 @@ from marl_airhockey.core.profiles import PROFILES
 from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import make_agent
 from marl_airhockey.transfer.table_fit import FittedTable
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 FitFile = Annotated[Path, typer.Option(help="File to write.")]
 
@@ -32,7 +32,9 @@ def fit(
     physics: Physics = None,
     recordings: Annotated[
         Path | None,
-        typer.Option(help="Folder of recordings of play, instead of playing."),
+        typer.Option(
+            file_okay=False, help="Folder of recordings of play, instead of playing."
+        ),
     ] = None,
     steps: Annotated[int, typer.Option(help="Control steps of play.", min=1)] = 3000,
     seed: Annotated[int, typer.Option(help="Seed of the play.")] = 0,

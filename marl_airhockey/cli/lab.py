@@ -16,7 +16,7 @@ from marl_airhockey.core.errors import require
 from marl_airhockey.lab.faults import FAULTS
 from marl_airhockey.lab.setup import LabSetup
 from marl_airhockey.registry import find_backend
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 GAME, PLAYER = "juggle", "zoo/juggle"
 """Scenario and player of the demo"""

@@ -47,16 +47,18 @@ def play_league(
         Path | None, typer.Option(help="Every policy and run in it plays, too.")
     ] = None,
     games: Annotated[int, typer.Option(help="Of each pair.", min=2)] = 100,
-    out: Annotated[Path, typer.Option(help="Folder of table and picture.")] = Path(
-        "runs/league"
-    ),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of table and picture.")
+    ] = Path("runs/league"),
     backend: Backend = DEFAULT_BACKEND,
     profile: Profile = None,
     option: Options = None,
     seed: Annotated[int, typer.Option(help="Seed of the first game.")] = LEAGUE_SEED,
     exploit: Annotated[
         int | None,
-        typer.Option(help="Train a best response to each policy for so many steps."),
+        typer.Option(
+            help="Train a best response to each policy for so many steps.", min=1
+        ),
     ] = None,
     exploit_seeds: Annotated[
         int, typer.Option(help="Best responses to each, of seeds 0 .. N - 1.", min=1)

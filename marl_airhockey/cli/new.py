@@ -26,7 +26,9 @@ class Kind(StrEnum):
 def new(
     kind: Annotated[Kind, typer.Argument(help="What to write.")],
     name: Annotated[str, typer.Argument(help="Name of it, like my_task.")],
-    out: Annotated[Path, typer.Option(help="Folder of the file.")] = Path(),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the file.")
+    ] = Path(),
 ) -> None:
     """Write a scenario or a driver to change: a commented example that runs."""
     if not name.isidentifier() or name != name.lower():

@@ -19,7 +19,7 @@ from marl_airhockey.rollout.as_trained import (
     describe_environment,
     seen_in,
 )
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
@@ -38,8 +38,8 @@ Backend = Annotated[str, typer.Option(help="Physics.")]
 Profile = Annotated[
     str | None,
     typer.Option(
-        help="ideal, ur5e, gantry, or a file of airhockey fit-table; by default that "
-        "of the policy's training, else ideal."
+        help="ideal, ur5e, ur5e-authors, gantry, or a file of airhockey fit-table; by "
+        "default that of the policy's training, else ideal."
     ),
 ]
 Observe = Annotated[
@@ -99,13 +99,15 @@ def settings(pairs: list[str] | None) -> dict[str, Any]:
     """Return NAME=VALUE pairs as a dict; values as in TOML, bare words as strings.
 
     Raises:
-        ValueError: a pair without "=".
+        ValueError: A pair without "=", or a name that is given twice.
     """
     chosen: dict[str, Any] = {}
     for pair in pairs or []:
         name, equals, value = pair.partition("=")
         if not equals:
             raise ValueError(f"{pair!r}: expected NAME=VALUE")
+        if name in chosen:
+            raise ValueError(f"{pair!r}: {name} is given twice")
         try:
             chosen[name] = tomllib.loads(f"v = {value}")["v"]
         except tomllib.TOMLDecodeError:
@@ -117,17 +119,21 @@ def physics_of(given: list[str] | None) -> dict[str, Any]:
     """Return physical parameters by name from the values of ``--physics``.
 
     Args:
-        given: Names of presets, TOML files, NAME=VALUE and NAME=LOW:HIGH; later ones
-            replace earlier ones.
+        given: Names of presets, TOML files, NAME=VALUE and NAME=LOW:HIGH; the latter
+            replace what is in presets and files.
 
     Raises:
-        ValueError: None of these.
+        ValueError: None of these, or a name that is given twice.
     """
+    loaded: dict[str, Any] = {}
     found: dict[str, Any] = {}
     for text in given or []:
         name, equals, value = text.partition("=")
+        read = {} if equals else load_physics(text)
+        if again := (loaded.keys() & read.keys()) | (found.keys() & {name}):
+            raise ValueError(f"--physics {text}: {min(again)} is given twice")
         if not equals:
-            found |= load_physics(text)
+            loaded |= read
             continue
         try:
             numbers = [float(part) for part in value.split(":")]
@@ -138,7 +144,7 @@ def physics_of(given: list[str] | None) -> dict[str, Any]:
                 f"--physics {text}: expected NAME=VALUE or NAME=LOW:HIGH, with numbers"
             )
         found[name] = numbers[0] if len(numbers) == 1 else tuple(numbers)
-    return found
+    return loaded | found
 
 
 def environment(

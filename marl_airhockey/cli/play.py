@@ -27,7 +27,7 @@ from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette

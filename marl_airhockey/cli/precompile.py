@@ -28,7 +28,8 @@ from marl_airhockey.registry import (
     zoo_names,
 )
 from marl_airhockey.rollout.as_trained import as_trained
-from marl_airhockey.world.build import Keywords, compile_world
+from marl_airhockey.world.build import compile_world
+from marl_airhockey.world.keywords import Keywords
 
 
 def precompile(
@@ -48,7 +49,8 @@ def precompile(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the code of a target.")
+        Path | None,
+        typer.Option(file_okay=False, help="Folder for the code of a target."),
     ] = None,
     jobs: Annotated[
         int, typer.Option(help="Number of processes that compile.", min=1)

@@ -11,7 +11,8 @@ import typer
 
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.registry import zoo_names
-from marl_airhockey.world.build import Keywords, table_keywords
+from marl_airhockey.world.build import table_keywords
+from marl_airhockey.world.keywords import Keywords
 
 REAL = "real"
 """Name of the backend that is a real table"""

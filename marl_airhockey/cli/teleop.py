@@ -31,9 +31,9 @@ def teleop(
         Path | None,
         typer.Option(help="Of --by shadow: file of that camera, calibrate --hand."),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the recordings.")] = Path(
-        "recordings"
-    ),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder of the recordings.")
+    ] = Path("recordings"),
     film: Annotated[
         bool, typer.Option(help="Keep the camera's pictures beside them.")
     ] = True,

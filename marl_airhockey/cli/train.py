@@ -45,7 +45,9 @@ def train(
     hidden: Annotated[
         int | None, typer.Option(help="Units of both layers; the paper's size is 256.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder of the run.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder of the run.")
+    ] = None,
     engine: Annotated[
         str | None, typer.Option(help="torch (usual), sb3, or rllib over many.")
     ] = None,
@@ -183,7 +185,9 @@ def _is_finished(folder: Path) -> bool:
 
 
 def export(
-    run: Annotated[Path, typer.Argument(help="Folder of a training run.")],
+    run: Annotated[
+        Path, typer.Argument(file_okay=False, help="Folder of a training run.")
+    ],
     out: Annotated[Path, typer.Option(help="The file to write.")] = Path("policy.npz"),
     checkpoint: Annotated[
         Path | None, typer.Option(help="One of the run's instead of its last policy.")
@@ -206,9 +210,9 @@ def export(
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for what it makes.")] = Path(
-        "runs/demo"
-    ),
+    out: Annotated[
+        Path, typer.Option(file_okay=False, help="Folder for what it makes.")
+    ] = Path("runs/demo"),
     scenario: Annotated[str, typer.Option(help="What to learn.")] = "juggle",
     steps: Annotated[
         int | None,

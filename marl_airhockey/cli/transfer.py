@@ -52,7 +52,7 @@ def transfer(
     ] = 0,
     seed: Annotated[int, typer.Option(help="Of training.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of runs and results.")
+        Path | None, typer.Option(file_okay=False, help="Folder of runs and results.")
     ] = None,
     option: Options = None,
     num_workers: Workers = None,

@@ -33,7 +33,7 @@ from marl_airhockey.cli.real_table import (
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.evaluation.comparison import Comparison, Estimates
@@ -53,7 +53,8 @@ def trials(
     ],
     scenario: ScenarioOption = None,
     out: Annotated[
-        Path, typer.Option(help="Folder of the sheet; one there goes on.")
+        Path,
+        typer.Option(file_okay=False, help="Folder of the sheet; one there goes on."),
     ] = Path("trials"),
     number: Annotated[
         int, typer.Option("--trials", help="Of each method.", min=1)

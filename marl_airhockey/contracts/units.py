@@ -14,6 +14,7 @@ from marl_airhockey.core.parameters import PUCK_SPEED_CAP
 Degrees = float
 Latency = float
 Metres = float
+Pucks = int
 Seconds = float
 Share = float
 Speed = float
@@ -33,6 +34,7 @@ UNITS = {
     "Degrees": Unit(180.0, "deg"),
     "Latency": Unit(1.0, "s"),
     "Metres": Unit(5.0, "m"),
+    "Pucks": Unit(8.0, "", 1.0),
     "Seconds": Unit(3600.0, "s"),
     "Share": Unit(1.0),
     "Speed": Unit(PUCK_SPEED_CAP, "m/s"),
@@ -63,7 +65,7 @@ def check_number(name: str, kind: object, value: object) -> None:
         )
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError(f"{name}: expected a number, got {value!r}")
-    whole, unit = kind == "int", UNITS[str(kind)]
+    whole, unit = kind in ("int", "Pucks"), UNITS[str(kind)]
     fits = isinstance(value, int) or not whole
     if not (fits and math.isfinite(value) and unit.least <= value <= unit.most):
         words = "a whole number" if whole else "a number"

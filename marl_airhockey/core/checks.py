@@ -42,6 +42,17 @@ def check_count(name: str, value: Any, why: str = "") -> int:
     return int(value)
 
 
+def check_seed(seed: Any) -> int:
+    """Return a seed of the first of several episodes as a plain int.
+
+    Raises:
+        ValueError: It is not a whole number of at least 0.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, Integral) or seed < 0:
+        raise ValueError(f"seed: {seed!r} must be a whole number of at least 0")
+    return int(seed)
+
+
 def check_fields(made: Any, **ranges: Range) -> None:
     """Check the fields of a dataclass.
 

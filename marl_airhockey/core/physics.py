@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -141,12 +142,12 @@ def _checked(name: str, value: Value) -> tuple[float, float]:
         raise ValueError(unknown_name("physical parameter", name, PARAMETERS))
     parameter = PARAMETERS[name]
     pair = value if isinstance(value, (tuple, list)) else (value, value)
-    try:
-        low, high = (float(v) for v in pair)
-    except (TypeError, ValueError):
+    numbers = [v for v in pair if isinstance(v, Real) and not isinstance(v, bool)]
+    if len(pair) != 2 or len(numbers) != 2:
         raise ValueError(
             f"physics[{name!r}]: expected a number or (low, high), got {value!r}"
-        ) from None
+        )
+    low, high = map(float, numbers)
     if not parameter.low <= low <= high <= parameter.high:
         raise ValueError(
             f"physics[{name!r}]: {value!r} must lie within {parameter.low} .. "
@@ -175,10 +176,13 @@ def load_physics(source: str | Path) -> dict[str, Any]:
     if str(source) in PRESETS:
         return {"preset": str(source)}
     try:
-        return tomllib.loads(Path(source).read_text())
+        found = tomllib.loads(Path(source).read_text())
     except (OSError, tomllib.TOMLDecodeError) as error:
         names = ", ".join(PRESETS)
         raise ValueError(
             f"physics {str(source)!r}: no preset ({names}) and no TOML file of "
             f"parameters: {error}"
         ) from error
+    if not found:
+        raise ValueError(f"physics {source}: there are no parameters in the file")
+    return found

@@ -194,7 +194,14 @@ def load_profile(path: Path) -> Profile:
     known = {"base", "what", "ranges"}
     for name in given.keys() - known:
         raise ValueError(f"profile {path}: {unknown_name('key', name, known)}")
+    if not given:
+        raise ValueError(f"profile {path}: there is nothing in the file")
     base_name, ranges = given.get("base", "ideal"), given.get("ranges", {})
+    if not isinstance(ranges, dict):
+        raise ValueError(
+            f"profile {path}: ranges: {ranges!r}; expected a table, [ranges], of "
+            "name = [low, high]"
+        )
     if base_name not in PROFILES:
         raise ValueError(
             f"profile {path}: {unknown_name('base', str(base_name), PROFILES)}"
@@ -205,7 +212,7 @@ def load_profile(path: Path) -> Profile:
                 f"profile {path}: {unknown_name('parameter', name, PARAMETERS)}"
             )
         numbers = isinstance(pair, list) and len(pair) == 2
-        if not numbers or not all(isinstance(x, (int, float)) for x in pair):
+        if not numbers or not all(type(x) in (int, float) for x in pair):
             raise ValueError(f"profile {path}: {name}: expected [low, high]")
         low, high, bounds = pair[0], pair[1], PARAMETERS[name]
         if not bounds.low <= low <= high <= bounds.high:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from marl_airhockey.data.parquet import read_table, write_table
 from marl_airhockey.data.parts import parts_of
 from marl_airhockey.data.reader import (
     episodes_of,
+    missing_steps,
     read_episode_rows,
     read_head,
     step_counts,
@@ -30,10 +33,14 @@ def repaired(path: Path, out: Path) -> list[str]:
         ValueError: Not even its head can be read, or no episode, or there is such a
             folder as ``out``.
     """
-    head, wrong = read_head(path), list[str]()
+    head, wrong, cut = read_head(path), list[str](), dict[int, str]()
+    with suppress(ValueError):  # A part cannot be read, which is named below.
+        cut = missing_steps(path)
     with whole_recording(out, head) as writer:
         for episode in episodes_of(path, bad=wrong):
-            writer.write(episode)
+            if episode.index not in cut:
+                writer.write(episode)
+        wrong += cut.values()
         if not writer.episodes:
             words = "; ".join(wrong)
             raise ValueError(f"{path}: no episode of it can be read: {words}")
@@ -46,11 +53,23 @@ def merged(paths: Sequence[Path], out: Path) -> None:
     Raises:
         ValueError: Recordings that differ, or one that makes no sense; named.
     """
-    head = shared_head(paths)
-    with whole_recording(out, head) as writer:
+    head, seats = shared_head(paths), [read_head(p).get("players", []) for p in paths]
+    players = [_together(seat) for seat in zip(*seats, strict=True)]
+    with whole_recording(out, {**head, "players": players}) as writer:
         for path in paths:
             for episode in episodes_of(path):
                 writer.write(episode)
+
+
+def _together(players: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the description of a seat in which several players have played."""
+    names = {name: [player[name] for player in players] for name in players[0]}
+    return {
+        name: values[0]
+        if all(value == values[0] for value in values)
+        else " + ".join(dict.fromkeys(str(value) for value in values if value))
+        for name, values in names.items()
+    }
 
 
 def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
@@ -61,7 +80,7 @@ def divided(path: Path, out: Path, share: float, seed: int) -> list[Path]:
             sense; named.
     """
     head, count = read_head(path), len(read_episode_rows(path))
-    tested = round(share * count)
+    tested = round(share * count) if 0.0 < share < 1.0 else 0
     if not 0 < tested < count:
         raise ValueError(
             f"--test {share}: {tested} of the {count} episodes; expected at least one "

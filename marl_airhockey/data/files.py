@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from marl_airhockey.core.recording import META
-from marl_airhockey.data.reader import read_head
+from marl_airhockey.data.reader import missing_steps, read_head
 from marl_airhockey.jit.folders import cache_folder
 
 NAME = re.compile(r"^\w[-.\w]*(/\w[-.\w]*)*$")
@@ -64,6 +64,26 @@ def recordings_in(paths: Sequence[Path]) -> list[Path]:
         found += sorted(meta.parent for meta in where.rglob(META))
     if not found:
         raise ValueError(f"{paths[0]}: there are no recordings in it ({META})")
+    places = [path.resolve() for path in found]
+    for path, place in zip(found, places, strict=True):
+        if places.count(place) > 1:
+            raise ValueError(f"{path}: this recording is given twice")
+    return found
+
+
+def whole_recordings_in(paths: Sequence[Path]) -> list[Path]:
+    """Return the recordings of `recordings_in`, of which no step is missing.
+
+    Raises:
+        ValueError: See there, or episodes of a recording lack steps, with the remedy.
+    """
+    found = recordings_in(paths)
+    for path in found:
+        if lacking := missing_steps(path):
+            raise ValueError(
+                f"{path}: {len(lacking)} of its episodes lack steps; airhockey data "
+                f"repair {path} --out NEW keeps the good ones"
+            )
     return found
 
 

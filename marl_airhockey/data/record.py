@@ -23,7 +23,8 @@ from marl_airhockey.rollout.columns import (
 )
 from marl_airhockey.rollout.play import play
 from marl_airhockey.rollout.rollout import AT_ONCE, play_episodes
-from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 
@@ -69,6 +70,11 @@ def record_episodes(
         camera = _camera(world) if film else None
         with _opened(path, head) as writer:
             begun = writer.episodes
+            if begun > episodes:
+                raise ValueError(
+                    f"{path}: it has {begun} episodes already; give a larger number, "
+                    "or another folder"
+                )
             progress(min(begun, episodes))
             if begun and film:
                 raise ValueError(f"{path}: a film cannot be resumed; name another")

@@ -40,8 +40,13 @@ def load_rig(path: Path, kind: str) -> dict[str, Any]:
         raise ValueError(
             f"{path}: there is no rig; {WRITERS[kind]} writes one"
         ) from None
-    except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: {error}") from error
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise ValueError(
+            f"{path}: no rig: a rig is a JSON file; {WRITERS[kind]} writes one "
+            f"({error})"
+        ) from error
     return rig_fields(path, given, kind)
 
 
@@ -58,6 +63,8 @@ def rig_fields(path: Path, given: Any, kind: str) -> dict[str, Any]:
     """
     given = dict(given) if isinstance(given, dict) else given
     found = given.pop("format", None) if isinstance(given, dict) else None
+    if found is None:
+        raise ValueError(f"{path}: no rig; {WRITERS[kind]} writes one")
     if found != FORMAT:
         raise ValueError(f"{path}: format {found!r}, expected {FORMAT}")
     other = given.pop("kind", "table")

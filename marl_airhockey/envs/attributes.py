@@ -6,7 +6,7 @@ from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any
 
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 LIKE = 0.8

@@ -14,7 +14,7 @@ from marl_airhockey.envs.episode_length import SpecifiedLength
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.seats import check_one_open
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 
 class AirHockeySingleEnv(CheckedAttributes, SpecifiedLength, gymnasium.Env[Any, Array]):

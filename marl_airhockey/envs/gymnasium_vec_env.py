@@ -18,10 +18,16 @@ from marl_airhockey.envs.episode_length import SpecifiedLength
 from marl_airhockey.envs.infos import infos_of
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.pictures import Pictures
-from marl_airhockey.envs.reset_options import reset_world
+from marl_airhockey.envs.reset_options import (
+    MASK,
+    OPTIONS,
+    check_options,
+    reset_world,
+)
 from marl_airhockey.envs.seats import check_one_open
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.build import build_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.observer import Observation
 from marl_airhockey.world.spaces import action_space, observation_space
 from marl_airhockey.world.step_result import StepResult
@@ -108,12 +114,14 @@ class AirHockeyVectorEnv(
         Raises:
             ValueError: a bad seed, mask, option or state, named.
         """
-        given = dict(options or {})
-        mask = given.pop("reset_mask", None)
+        given = {} if options is None else options
+        check_options(self.world, given, (*OPTIONS, MASK))
+        mask = given.get(MASK)
         if mask is not None:
             return self._reset_some(np.asarray(mask), seed), self._infos()
         self._ended[:] = False
-        observation = _rows(reset_world(self.world, seed, given))
+        own = {name: given[name] for name in OPTIONS if name in given}
+        observation = _rows(reset_world(self.world, seed, own))
         if seed is not None:
             first = int(self.world.seeds[0])
             self._np_random, self._np_random_seed = np_random(first)
@@ -127,6 +135,8 @@ class AirHockeyVectorEnv(
             )
         if seed is not None:
             raise ValueError("seed: leave it out beside a reset_mask")
+        if not self.world.episode.number.all():
+            raise RuntimeError("reset_mask: call reset() without one first")
         self._ended[mask] = False
         worlds = np.flatnonzero(mask)
         self.world.reset_worlds(worlds)

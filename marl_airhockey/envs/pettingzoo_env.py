@@ -18,7 +18,8 @@ from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.seats import check_some_open
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.build import build_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.spaces import action_space, observation_space
 from marl_airhockey.world.step_result import StepResult
 

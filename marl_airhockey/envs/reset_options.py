@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any
 
@@ -13,19 +14,34 @@ from marl_airhockey.world.observer import Observation
 from marl_airhockey.world.world import World
 
 OPTIONS = ("state", "memory")
+MASK = "reset_mask"
+"""Further option of `reset` of a vector environment"""
 
 
-def check_options(options: Mapping[str, Any]) -> None:
-    """Refuse a misspelt option, and a memory without its state.
+def check_options(world: World, options: Any, known: Sequence[str] = OPTIONS) -> None:
+    """Refuse a misspelt option, a scenario's field, and a memory without its state.
 
     Other options pass unheeded, as conformance tests send some.
 
+    Args:
+        world: Worlds that are reset.
+        options: Options that were given.
+        known: Names of the options that exist.
+
     Raises:
-        ValueError: One of these, named.
+        ValueError: One of these, named, or options that are no dict.
     """
-    for name in options:
-        if name not in OPTIONS and get_close_matches(name, OPTIONS):
-            raise ValueError(unknown_name("reset option", name, OPTIONS))
+    if not isinstance(options, Mapping):
+        raise ValueError(f"reset options: {options!r} is no dict")
+    own = [field.name for field in fields(world.scenario)]
+    for name in options.keys() - {*known}:
+        if name in own:
+            raise ValueError(
+                f"reset options: {name!r} is a field of {world.scenario.name}; set it "
+                f'where the environment is built, options={{"{name}": ...}}'
+            )
+        if get_close_matches(name, known):
+            raise ValueError(unknown_name("reset option", name, known))
     if "memory" in options and "state" not in options:
         raise ValueError("reset options: a memory needs its state")
 
@@ -43,8 +59,8 @@ def reset_world(
     Raises:
         ValueError: A bad option, see `check_options`, or a state that does not fit.
     """
-    given = options or {}
-    check_options(given)
+    given = {} if options is None else options
+    check_options(world, given)
     observation = world.reset(seed)
     if "state" not in given:
         return observation
@@ -56,7 +72,7 @@ def reset_each(
 ) -> Observation:
     """Reset worlds with options for each, see `reset_world`."""
     for given in options:
-        check_options(given)
+        check_options(world, given)
     observation = world.reset(seed)
     for i, given in enumerate(options):
         if "state" in given:

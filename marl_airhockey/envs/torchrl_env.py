@@ -13,7 +13,8 @@ from torchrl.envs import EnvBase
 
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.build import build_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.observer import Observation
 from marl_airhockey.world.spaces import observation_space
 

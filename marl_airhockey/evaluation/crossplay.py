@@ -12,7 +12,8 @@ from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.stats import bootstrap
 from marl_airhockey.rollout.as_trained import seated_players
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, scenario_of
+from marl_airhockey.world.build import scenario_of
+from marl_airhockey.world.keywords import Keywords
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ import numpy as np
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.core.checks import check_count, check_seed
+from marl_airhockey.data.files import whole_recordings_in
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.evaluation.comparison import Outcomes
 from marl_airhockey.evaluation.deployability import Deployability
@@ -21,12 +23,8 @@ from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.columns import head_of
 from marl_airhockey.rollout.rollout import play_episodes
-from marl_airhockey.world.build import (
-    Keywords,
-    build_driven_world,
-    scenario_of,
-    table_keywords,
-)
+from marl_airhockey.world.build import build_driven_world, scenario_of, table_keywords
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 TEST_SEED = 2_000_000
@@ -114,6 +112,7 @@ def evaluate(
         ValueError: A seat without a driver, one that does not fit, or a reward term
             that is nan, named.
     """
+    episodes, seed = check_count("episodes", episodes), check_seed(seed)
     driver, keywords = make_agent(player), table_keywords(keywords)
     name = name or name_of(player, driver)
     if not exact:
@@ -121,8 +120,6 @@ def evaluate(
         driver = seen_in(driver, keywords)
     if scenario is None:
         raise ValueError("scenario: say what the driver is to play")
-    if episodes < 1:
-        raise ValueError(f"episodes: {episodes} must be at least 1")
     # On a real table episodes follow each other; elsewhere many are played at once.
     real = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
     game, dt = scenario_of(scenario, keywords), keywords.get("control_dt", 0.05)
@@ -162,6 +159,7 @@ def recorded_statistics(path: Path) -> EpisodeStatistics:
     Raises:
         ValueError: No recording, one without steps, or one that lacks a column.
     """
+    whole_recordings_in([path])
     dt = float(read_head(path)["control_dt"])
     try:
         found = EpisodeStatistics(episodes_of(path, COLUMNS), dt)

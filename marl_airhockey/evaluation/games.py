@@ -10,7 +10,8 @@ import numpy as np
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.rollout.play import play
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_world, scenario_of
+from marl_airhockey.world.build import build_world, scenario_of
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.roster import Roster
 
 

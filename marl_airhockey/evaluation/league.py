@@ -15,7 +15,8 @@ from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.policies.runs import policies_of
 from marl_airhockey.rollout.as_trained import seated_players
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, scenario_of
+from marl_airhockey.world.build import scenario_of
+from marl_airhockey.world.keywords import Keywords
 
 LEAGUE_SEED = 3_000_000
 """Seed of a league's first game"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,8 @@ def make_config(
     for name in APART:
         if name in settings:
             raise ValueError(f"{name}: it is no setting of a run; name it apart")
+    if algo in KINDS:
+        _check_settings(algo, settings)
     if algo in OFFLINE:
         if not data:
             raise ValueError(
@@ -69,6 +72,20 @@ def make_config(
     if not scenario:
         raise ValueError("say which SCENARIO to train")
     return PLAYING[algo](scenario, settings)
+
+
+def _check_settings(algo: str, settings: Mapping[str, Any]) -> None:
+    """Refuse settings that only other algorithms have.
+
+    Raises:
+        ValueError: One of these, with the algorithms.
+    """
+    has = {name: {f.name for f in fields(kind)} for name, kind in KINDS.items()}
+    for name in settings.keys() - has[algo]:
+        if others := [other for other in KINDS if name in has[other]]:
+            raise ValueError(
+                f"{name}: {algo} has no such setting, only {', '.join(others)}"
+            )
 
 
 def load_any_config(folder: Path) -> AnyConfig:

@@ -8,6 +8,7 @@ from pathlib import Path
 from pickle import UnpicklingError
 from typing import Any
 
+import numpy as np
 import torch
 
 from marl_airhockey.envs.slots import SlotEnv
@@ -74,8 +75,22 @@ def end_setup(run: TrainingRun[PPOConfig]) -> None:
     run.end_setup()
 
 
+def other_size(path: Path, error: RuntimeError) -> ValueError:
+    """Return the error for weights that do not fit the network of a run."""
+    return ValueError(
+        f"{path}: its network has another size; it is of another scenario, profile or "
+        f"--hidden ({str(error).splitlines()[-1].strip()})"
+    )
+
+
 def note_step(log: Log, env: SlotEnv) -> None:
-    """Log the reward terms of the last step, and scores against opponents."""
+    """Log the reward terms of the last step, and scores against opponents.
+
+    Raises:
+        ValueError: A reward term is nan; named.
+    """
+    if bad := [name for name, value in env.last_terms.items() if np.isnan(value)]:
+        raise ValueError(f"{env.world.scenario.name}: reward terms {bad} are nan")
     for name, value in env.last_terms.items():
         log.record_mean(f"reward/{name}", value)
     if isinstance(env, SelfPlayEnv):

@@ -10,7 +10,7 @@ from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.registry import make_agent
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 EVAL_SEED = 1_000_000
 """First seed of the evaluations during training"""

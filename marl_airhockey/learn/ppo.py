@@ -21,6 +21,7 @@ from marl_airhockey.learn.engine import (
     evaluate_and_record,
     load_state,
     note_step,
+    other_size,
     save_weights,
     training_threads,
 )
@@ -288,7 +289,7 @@ class Trainer:
         try:
             self.model.load_state_dict(state["model"])
         except RuntimeError as error:
-            raise ValueError(f"init: {path} has another size: {error}") from error
+            raise other_size(path, error) from error
         if whole:
             self._optimizer.load_state_dict(state["optimizer"])
 

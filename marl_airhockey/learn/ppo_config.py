@@ -68,6 +68,8 @@ class PPOConfig(SelfPlayConfig):
             raise ValueError("curriculum: only tasks on the engine torch have one")
         if self.engine == "rllib":
             self._check_rllib()
+        elif self.num_env_runners:
+            raise ValueError("num_env_runners: only the engine rllib has runners")
         if self.rollout % self.batch_size:
             raise ValueError(
                 f"batch_size: {self.batch_size} must divide n_steps x learners in "

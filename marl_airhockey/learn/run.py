@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -57,10 +58,23 @@ class Progress:
 
     @staticmethod
     def load(path: Path) -> Progress:
-        """Read what `save` wrote."""
-        data = json.loads(path.read_text())
-        data.pop("cpu_seconds")  # The sum of the others, for readers of the file.
-        return Progress(**{**data, "best": tuple(data["best"])})
+        """Read what `save` wrote.
+
+        Raises:
+            ValueError: It is damaged; names the file.
+        """
+        try:
+            data = json.loads(path.read_text())
+            data.pop("cpu_seconds")  # The sum of the others, for readers of the file.
+            return Progress(**{**data, "best": tuple(data["best"])})
+        except (KeyError, TypeError, ValueError) as error:
+            raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> ValueError:
+    return ValueError(
+        f"{path} is damaged ({error}); begin the run again in another folder"
+    )
 
 
 class TrainingRun(Generic[Config]):
@@ -84,9 +98,17 @@ class TrainingRun(Generic[Config]):
         self._next = (self.progress.steps // self._every + 1) * self._every
         self._table = folder / "evaluations.csv"
         if self._table.exists():
-            with self._table.open() as file:
-                *_, last = csv.DictReader(file)
-            self.latest = {name: float(value) for name, value in last.items()}
+            try:
+                with self._table.open() as file:
+                    *rows, last = csv.DictReader(file)
+                self.latest = {name: float(value) for name, value in last.items()}
+            except (TypeError, ValueError) as error:
+                raise _damaged(self._table, error) from error
+            if not state.exists():
+                if rows:
+                    raise _damaged(state, FileNotFoundError("it is missing"))
+                self._table.unlink()  # Killed within its first evaluation.
+                self.latest = {}
         self._clock = (time.process_time(), time.perf_counter())
 
     @property
@@ -156,13 +178,16 @@ class TrainingRun(Generic[Config]):
         return self.latest
 
     def _write(self, row: Metrics) -> None:
-        """Add a row to the table."""
-        fresh = not self._table.exists()
-        with self._table.open("a", newline="") as file:
+        """Add a row to the table, such that a killed process leaves whole rows."""
+        fresh, draft = not self._table.exists(), self._table.with_suffix(".part")
+        if not fresh:
+            shutil.copyfile(self._table, draft)
+        with draft.open("a", newline="") as file:
             writer = csv.DictWriter(file, list(row))
             if fresh:
                 writer.writeheader()
             writer.writerow(row)
+        draft.replace(self._table)
 
     @property
     def checkpoint_path(self) -> Path:

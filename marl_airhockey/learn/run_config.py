@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from marl_airhockey.policies.policy import trained_in
 from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.registry import DEFAULT_BACKEND
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +57,8 @@ class RunConfig:
             positive = f.name not in self.MAY_BE_ZERO
             if f.type in ("int", "float") and positive and value <= 0:
                 raise ValueError(f"{f.name}: {value} must be above 0")
+        if self.seed < 0:
+            raise ValueError(f"seed: {self.seed} must be 0 or more")
         if not self.hidden or any(w < 1 for w in self.hidden):
             raise ValueError(f"hidden: {self.hidden} must be widths above 0")
         if self.gamma > 1.0:

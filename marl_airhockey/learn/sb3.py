@@ -16,6 +16,7 @@ from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
+    other_size,
     training_threads,
 )
 from marl_airhockey.learn.evaluate_policy import Metrics
@@ -52,11 +53,13 @@ def _train(run: TrainingRun[PPOConfig]) -> Metrics:
     callback = TrainingCallback(run, rate)
     end_setup(run)
     fresh = progress.steps == 0
-    model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
-    row = callback.evaluate()
-    model.logger.dump(progress.steps)
-    model.logger.close()
-    env.close()
+    try:
+        model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
+        row = callback.evaluate()
+        model.logger.dump(progress.steps)
+    finally:
+        model.logger.close()
+        env.close()
     return row
 
 
@@ -64,7 +67,7 @@ def _take_weights(model: PPO, run: Path) -> None:
     """Load the weights of a run into a model, its exploration among them.
 
     Raises:
-        ValueError: no run, one of an older version, or one of another size.
+        ValueError: no run, one of another format, or one of another size.
     """
     kept = [run / f"{name}.zip" for name in ("best", "last")]
     path = next((file for file in kept if file.exists()), None)
@@ -76,7 +79,7 @@ def _take_weights(model: PPO, run: Path) -> None:
     try:
         model.policy.load_state_dict(weights)
     except RuntimeError as error:
-        raise ValueError(f"init: {run} has another size: {error}") from error
+        raise other_size(path, error) from error
 
 
 def make_logger(folder: Path, steps: int) -> Logger:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.registry import find_scenario
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
 RIVALS = ("random", "goalkeeper", "striker", "allround")
@@ -74,6 +74,11 @@ class SelfPlayConfig(RunConfig):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not self._open_teams:
+            raise ValueError(
+                f"drivers: every seat of {self.scenario!r} has a driver, so that "
+                "nothing is learned; leave one out"
+            )
         if self.drivers and self.self_play:
             raise ValueError(
                 f"drivers: self-play needs all seats of {self.scenario!r} open; to "

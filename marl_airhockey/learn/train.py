@@ -11,12 +11,14 @@ import json
 import platform
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.core.errors import require, unknown_name
@@ -110,32 +112,48 @@ def run_training(
 
     Raises:
         ValueError: a folder that holds another run or other things, no run to resume,
-            or one that was begun by an older version.
-        RuntimeError: a missing extra, with the line that installs it.
+            or one of another format.
+        RuntimeError: a missing extra, with the line that installs it, or another
+            process that trains in the folder.
     """
     if config is None:
         config = load_any_config(folder)
-    elif (folder / "config.toml").exists():
+        with _only_here(folder):
+            return _continuation(config, folder, report)()
+    if (folder / "config.toml").exists():
         raise ValueError(
             f"{folder} holds a run already: --resume it, or say another --out"
         )
-    elif folder.exists() and any(folder.iterdir()):
+    if folder.exists() and any(folder.iterdir()):
         raise ValueError(f"{folder} holds other things: say another folder, --out")
-    resume = _continuation(config, folder, report)
-    if (folder / "config.toml").exists():
-        return resume()
+    begin = _continuation(config, folder, report)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "config.toml").write_text(config.to_toml())
-    for named in (config.scenario, *config.drivers.values()):
-        trust_code(named)
-    (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
+    with _only_here(folder):
+        (folder / "config.toml").write_text(config.to_toml())
+        for named in (config.scenario, *config.drivers.values()):
+            trust_code(named)
+        (folder / "versions.json").write_text(json.dumps(versions(), indent=1))
+        try:
+            return begin()
+        except BaseException:
+            # A run that fails to start leaves nothing behind that it has made.
+            if not (folder / "state.json").exists():
+                shutil.rmtree(folder)
+            raise
+
+
+@contextmanager
+def _only_here(folder: Path) -> Iterator[None]:
+    """Let no other process train in a folder.
+
+    Raises:
+        RuntimeError: Another one does.
+    """
     try:
-        return resume()
-    except BaseException:
-        # A run that fails to start leaves nothing behind that it has made.
-        if not (folder / "state.json").exists():
-            shutil.rmtree(folder)
-        raise
+        with FileLock(folder / ".lock", timeout=0):
+            yield
+    except Timeout as error:
+        raise RuntimeError(f"{folder}: another process trains in it") from error
 
 
 def _continuation(

@@ -14,7 +14,8 @@ from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.rollout.columns import first_columns
-from marl_airhockey.world.build import Keywords, build_world
+from marl_airhockey.world.build import build_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.step_result import StepResult
 from marl_airhockey.world.world import World
 

@@ -15,7 +15,7 @@ from marl_airhockey.backends.real.operator import Operator, make_operator
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.live_match import COUNTDOWN, LiveMatch
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 WIDTH, QUALITY = 640, 80
 """Width of the camera's pictures as pages get them, px, and their JPEG quality"""

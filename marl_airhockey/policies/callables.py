@@ -29,17 +29,17 @@ class OwnPolicy(Policy):
     def check(self, observation: Any) -> None:
         shape = _shape(observation)
         many = _ask(self.predict, observation)
-        if isinstance(many, np.ndarray) and many.shape == (shape[0], 2):
+        if _are_actions(many, (shape[0], 2)):
             self.one_by_one = False
             return
         one = _ask(self.predict, _row(observation, 0))
-        if isinstance(one, np.ndarray) and one.shape == (2,):
+        if _are_actions(one, (2,)):
             self.one_by_one = True
             return
         raise ValueError(
             f"{self.source} is no player of this environment: for observations of "
             f"shape {shape} it gave {_text(many)}, for one of them {_text(one)}; "
-            f"expected actions of shape ({shape[0]}, 2) or (2,)"
+            f"expected finite actions of shape ({shape[0]}, 2) or (2,)"
         )
 
     def _actions(self, observation: Any) -> Array:
@@ -145,9 +145,16 @@ def _ask(predict: Callable[[Any, bool], Array], observation: Any) -> Array | Exc
         return error
 
 
+def _are_actions(answer: Array | Exception, shape: tuple[int, ...]) -> bool:
+    """Return True for finite real numbers of a shape."""
+    if isinstance(answer, Exception) or answer.dtype.kind not in "iuf":
+        return False
+    return answer.shape == shape and bool(np.isfinite(answer).all())
+
+
 def _text(answer: Array | Exception) -> str:
     if isinstance(answer, np.ndarray):
-        return f"shape {answer.shape} of {answer.dtype}"
+        return f"shape {answer.shape} of {answer.dtype}, such as {answer.ravel()[:2]}"
     return f"{type(answer).__name__}: {answer}"
 
 

@@ -116,6 +116,9 @@ class NumpyPolicy:
             parts = arrays["centre"], arrays["unit"], arrays["log_std"]
             found = NumpyPolicy(pairs, *parts, card)
             found._check()
+        except KeyError as error:
+            words = f"the array {error} is missing"
+            raise ValueError(f"{path} is no policy of ours: {words}") from error
         except Exception as error:  # Whatever a broken or hostile file makes of it.
             raise ValueError(f"{path} is no policy of ours: {error}") from error
         return found

@@ -50,6 +50,8 @@ class Policy(Driver):
         action = self._actions(view.observation)
         if self.noise is not None and not self.deterministic:
             action += self.noise * view.rng.normal(2)
+        if not np.isfinite(action).all():
+            raise ValueError(f"{self.source}: its actions are nan or inf")
         return np.clip(action, -1.0, 1.0), memory
 
     def check(self, observation: Array | Mapping[str, Array]) -> None:

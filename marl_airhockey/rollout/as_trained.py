@@ -12,7 +12,7 @@ from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import find_scenario, make_agent, runs_code
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 EVERYWHERE = ("profile", "control_dt", "goals")
 """Keywords that hold for a policy in any scenario"""
@@ -47,7 +47,7 @@ def as_trained(
     if scenario is None:
         scenario = _agreed("scenario", known)
         if scenario is None:
-            raise ValueError("--scenario: say what the driver is to play")
+            raise ValueError("scenario: say what the driver is to play")
         _require_trust(str(scenario), players)
     same = {n: t for n, t in known.items() if _is_scenario(t, scenario)}
     found = {name: _agreed(name, known) for name in EVERYWHERE}
@@ -94,6 +94,9 @@ def describe_environment(
     sources = [p.source for p in players.values() if isinstance(p, Policy)]
     if len(players) == 1 and sources and sources[0] not in players:
         parts.append(f"policy {sources[0]}")
+    for name, player in players.items():
+        if player.trained_in and not _is_scenario(player.trained_in, named):
+            parts.append(f"{name} was trained in {player.trained_in['scenario']}")
     return f"{named}: {', '.join(parts)}"
 
 

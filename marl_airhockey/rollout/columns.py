@@ -19,7 +19,7 @@ from marl_airhockey.core.recording import Columns, Episode, Recording
 from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
 from marl_airhockey.types import Memory
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 STATE, SENSED, MEMORY, TERM = "state.", "sensed.", "memory.", "term."

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator, Iterator
 from typing import Unpack
 
 import numpy as np
 
 from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.checks import check_count
+from marl_airhockey.core.checks import check_count, check_seed
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.core.recording import PLAYED, Episode
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
@@ -16,7 +16,8 @@ from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.collector import Collector
 from marl_airhockey.rollout.columns import step_columns
 from marl_airhockey.rollout.play import play
-from marl_airhockey.world.build import Keywords, build_driven_world, table_keywords
+from marl_airhockey.world.build import build_driven_world, table_keywords
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 AT_ONCE = 64
@@ -31,7 +32,7 @@ def rollout(
     seed: int = 0,
     columns: Collection[str] | None = None,
     **keywords: Unpack[Keywords],
-) -> Iterator[Episode]:
+) -> Generator[Episode]:
     """Let a driver play episodes at ``paddle_0`` and yield each of them.
 
     What is not given is that of a policy's training, as in `evaluate`. An episode has
@@ -52,7 +53,7 @@ def rollout(
         ValueError: A seat without a driver, one that does not fit, an unknown column,
             or a reward term that is nan; named.
     """
-    check_count("episodes", episodes)
+    episodes, seed = check_count("episodes", episodes), check_seed(seed)
     driver, keywords = make_agent(player), table_keywords(keywords)
     scenario, keywords = as_trained({"player": driver}, scenario, keywords)
     driver = seen_in(driver, keywords)
@@ -60,6 +61,13 @@ def rollout(
     real = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
     at_once = 1 if real else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
+    return _closing(world, episodes, seed, columns)
+
+
+def _closing(
+    world: World, episodes: int, seed: int, columns: Collection[str] | None
+) -> Generator[Episode]:
+    """Yield the episodes, then close the world."""
     try:
         for episode in play_episodes(world, episodes, seed, columns):
             for name in set(columns or ()) - episode.columns.keys():

@@ -12,7 +12,8 @@ from marl_airhockey.render.video import check_ending, width_of, write_video
 from marl_airhockey.rollout.play import play
 from marl_airhockey.rollout.replay import Replay
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 FINAL_HOLD = 0.7

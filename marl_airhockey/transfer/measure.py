@@ -11,7 +11,7 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.settings import load_config
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 TUNING: dict[str, Any] = {
     "backend": "robosuite",

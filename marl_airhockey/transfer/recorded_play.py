@@ -18,7 +18,8 @@ from marl_airhockey.data.reader import read_recording
 from marl_airhockey.rollout.columns import scenario_of
 from marl_airhockey.rollout.rollout import play_episodes
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.world.keywords import Keywords
 
 JUMP_SLACK = 0.5
 """Excess of a body's mean speed in a step over its speeds before and after it, m/s,

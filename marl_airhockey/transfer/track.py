@@ -23,6 +23,8 @@ SHORTEST = 6
 """Fewest rows of a flight."""
 LOST = 0.08
 """Longest time without a row within which a contact may be, s."""
+OFF = 0.1
+"""Largest distance of a puck from the table that a camera may report, m"""
 GAP = 0.02
 """Largest distance of a puck from what it touches at a contact, m."""
 
@@ -93,8 +95,16 @@ def read_track(path: Path, table: Table, origin: str = "centre") -> Track:
             f"{SLOWEST_RATE:.0f} are needed: contacts could not be told apart"
         )
     low = np.asarray(table.vertices).min(0) if origin == "corner" else np.zeros(2)
+    puck, corners = values[:, 1:3] + low, np.asarray(table.vertices)
+    inside = (corners.min(0) - OFF < puck) & (puck < corners.max(0) + OFF)
+    if not inside.all():
+        row = int(np.flatnonzero(~inside.all(1))[0])
+        raise ValueError(
+            f"{path}: row {row}: the puck at {values[row, 1:3].tolist()} m is off the "
+            "table; are the positions in metres, and is --origin right?"
+        )
     paddle = values[:, 3:5] + low if has_paddle else None
-    return Track(values[:, 0], values[:, 1:3] + low, paddle)
+    return Track(values[:, 0], puck, paddle)
 
 
 def cut(track: Track, table: Table) -> tuple[Flights, Contacts]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from typing import Any, TypedDict
+from collections.abc import Collection
 
 import numpy as np
 
@@ -12,11 +11,9 @@ from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.core.checks import check_count
 from marl_airhockey.core.errors import (
-    UnknownKeywordError,
-    unknown_keyword,
     unknown_name,
 )
-from marl_airhockey.core.physics import Given, Physics
+from marl_airhockey.core.physics import Physics
 from marl_airhockey.jit.threads import threads
 from marl_airhockey.registry import (
     DEFAULT_BACKEND,
@@ -24,55 +21,12 @@ from marl_airhockey.registry import (
     find_scenario,
     make_agent,
 )
+from marl_airhockey.world.keywords import Keywords, check_keywords
 from marl_airhockey.world.world import World
 
 LONGEST_STEP = 0.2
 """Longest control step, s, for which overlaps stay below 0.25 mm; in longer ones a
 paddle has time to come to where a puck has crossed a goal line."""
-
-
-OTHER_NAMES = {
-    **dict.fromkeys(("num_envs", "n_envs", "batch_size"), "num_worlds"),
-    **dict.fromkeys(("max_episode_steps", "max_steps", "horizon"), "max_cycles"),
-    **dict.fromkeys(("camera", "camera_name"), "viewpoint"),
-}
-"""Names of keywords in other libraries, with ours"""
-
-
-class Keywords(TypedDict, total=False):
-    """Keywords of every environment; see `build_world` for meanings."""
-
-    backend: str
-    drivers: Mapping[str, Any]
-    seats: str
-    profile: str
-    observe: str
-    goals: str
-    physics: Given
-    control_dt: float
-    substeps: int
-    max_cycles: int
-    options: Mapping[str, Any]
-    rig: str
-
-
-def check_names(keywords: Mapping[str, Any]) -> None:
-    """Refuse keywords that no environment has.
-
-    Raises:
-        UnknownKeywordError: One of these, with the one that was meant.
-    """
-    for name in keywords:
-        if name in OTHER_NAMES:
-            raise UnknownKeywordError(
-                f"unexpected keyword argument {name!r}; here it is "
-                f"{OTHER_NAMES[name]!r}"
-            )
-        if name not in Keywords.__annotations__:
-            raise UnknownKeywordError(
-                unknown_keyword(name, Keywords.__annotations__)
-                + "; fields of the scenario go into options={...}"
-            )
 
 
 def build_world(
@@ -116,7 +70,7 @@ def build_world(
         ValueError: An unknown name or a value that makes no sense, named.
         RuntimeError: A backend that cannot run here, with the fix.
     """
-    check_names(keywords)
+    check_keywords(keywords)
     keywords = table_keywords(keywords)
     threads()  # Refused here if it makes no sense, not at the first step.
     num_worlds = check_count("num_worlds", num_worlds)
@@ -222,11 +176,8 @@ def _physics(
 def _drivers(game: Scenario, backend: Backend, keywords: Keywords) -> dict[int, Driver]:
     """Return the drivers that keywords name, by seat."""
     agents = [f"paddle_{i}" for i in range(len(game.scene.seats))]
-    given = keywords.get("drivers", {})
-    if not isinstance(given, Mapping):
-        raise ValueError(f"drivers: {given!r} is no dict of drivers by agent")
     drivers: dict[int, Driver] = {}
-    for agent, driver in given.items():
+    for agent, driver in keywords.get("drivers", {}).items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
         drivers[agents.index(agent)] = seated = make_agent(driver)
@@ -270,6 +221,12 @@ def scenario_of(scenario: str | Scenario, keywords: Keywords) -> Scenario:
     """Return the scenario that keywords ask for."""
     options = dict(keywords.get("options", {}))
     for shared in ("seats", "goals"):
-        if shared in keywords:
-            options[shared] = keywords.get(shared)
+        if shared not in keywords:
+            continue
+        if options.get(shared, keywords.get(shared)) != keywords.get(shared):
+            raise ValueError(
+                f"{shared}: given twice, {keywords.get(shared)!r} and in options "
+                f"{options[shared]!r}"
+            )
+        options[shared] = keywords.get(shared)
     return find_scenario(scenario, **options)

@@ -32,7 +32,8 @@ from marl_airhockey.lab.lab import Lab, LabClient, served
 from marl_airhockey.lab.ur_controller.faults import FAULTS
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.world.keywords import Keywords
 from marl_airhockey.world.world import World
 
 BEFORE, LISTEN = 20, 80

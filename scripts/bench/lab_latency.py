@@ -32,7 +32,8 @@ from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
 from marl_airhockey.lab.lab import Lab, LabClient, served
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import Keywords, build_driven_world, build_world
+from marl_airhockey.world.build import build_driven_world, build_world
+from marl_airhockey.world.keywords import Keywords
 
 STEPS, CHANGES, PAUSE = 400, 40, 8
 """Control steps of the juggler; changes of the command, and steps between them"""

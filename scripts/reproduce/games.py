@@ -34,7 +34,7 @@ from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
 from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 COOPERATIVE = ("rally", "team_juggle")
 ON_NUMBA: Keywords = {"backend": "numba"}

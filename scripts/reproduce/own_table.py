@@ -43,7 +43,8 @@ from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.rollout.rollout import play_episodes
-from marl_airhockey.world.build import Keywords, build_driven_world
+from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.world.keywords import Keywords
 
 OPTIONS = {"table": LabSetup().table}
 EPISODES = 1000

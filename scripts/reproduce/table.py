@@ -45,7 +45,7 @@ from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 ALGOS: dict[str, tuple[str, dict[str, Any]]] = {
     "bc": ("bc", {"total_steps": 20_000}),

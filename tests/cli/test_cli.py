@@ -55,7 +55,7 @@ def test_a_policy_is_measured_where_it_was_trained_unless_told_otherwise():
     words = ("evaluate", "zoo/touch", "--episodes", 5, "--no-floors", "--json")
     assert json.loads(airhockey(*words).stdout)["scenario"] == "touch"
     told = airhockey("evaluate", "striker", "--episodes", 5, ok=False).stderr
-    assert "--scenario: say what the driver is to play" in told
+    assert "scenario: say what the driver is to play" in told
 
 
 def test_watch_writes_a_film(tmp_path):
@@ -111,6 +111,40 @@ def test_demo_makes_what_it_says(tmp_path):
             "play longer (--steps), or give more recordings",
         ),
         (("watch", "still", "-s", "reach", "--video", "a.avi"), "must end in"),
+        (
+            ("evaluate", "still", "-s", "duel", *("--driver", "paddle_1=striker") * 2),
+            "paddle_1 is given twice",
+        ),
+        (
+            ("evaluate", "still", "-s", "touch", *("--physics", "tilt=3") * 2),
+            "tilt is given twice",
+        ),
+        (
+            ("evaluate", "still", "-s", "touch", *("--physics", "wooden") * 2),
+            "preset is given twice",
+        ),
+        (("train", "touch", "--driver", "paddle_0=striker"), "leave one out"),
+        (("train", "touch", "--num-env-runners", "4"), "only the engine rllib"),
+        (("train", "touch", "--seed", "-1"), "seed: -1 must be 0 or more"),
+        (
+            ("train", "--algo", "iql", "--data", "x", "--engine", "sb3"),
+            "engine: iql has no such setting, only ppo",
+        ),
+        (("league", "duel", "--out", __file__), "is a file"),
+        (("league", "duel", "--exploit", "-5"), "--exploit"),
+        (
+            (
+                "evaluate",
+                "still",
+                "-s",
+                "reach",
+                "--backend",
+                "real",
+                "--rig",
+                __file__,
+            ),
+            "no rig: a rig is a JSON file; airhockey calibrate",
+        ),
     ],
 )
 def test_mistakes_give_one_line_and_a_non_zero_exit(words, message):

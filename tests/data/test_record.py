@@ -8,6 +8,7 @@ from pyarrow import parquet as pq
 
 import marl_airhockey as ah
 from marl_airhockey.data.derived import divided, merged
+from marl_airhockey.data.files import recordings_in
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.summary import summarize_recording
@@ -160,10 +161,18 @@ def test_recordings_are_divided_and_merged(tmp_path):
     assert [len(own) for own in seeds] == [7, 3]
     assert sorted(seeds[0] + seeds[1]) == list(range(7, 17))
     merged(parts, tmp_path / "whole")
+    with pytest.raises(ValueError, match="given twice"):
+        recordings_in([path, tmp_path / "parts", path])
     again = read_recording(tmp_path / "whole").episodes
     assert [e.seed for e in again] == seeds[0] + seeds[1]
     with pytest.raises(ValueError, match="at least one for train"):
         divided(path, tmp_path / "none", 0.0, seed=0)
+    merged([path, record(tmp_path / "b", "random", "touch", 1)], tmp_path / "two")
+    assert read_recording(tmp_path / "two").head["players"] == [
+        {"driver": "still + random", "person": None}
+    ]
+    with pytest.raises(ValueError, match="it has 10 episodes already"):
+        record(tmp_path, "still", "touch", 3)
     other = record(tmp_path / "more", "still", "reach", 1)
     with pytest.raises(ValueError, match="scenario is 'reach'"):
         merged([path, other], tmp_path / "both")

@@ -15,6 +15,7 @@ import pytest
 from marl_airhockey.core.recording import FORMAT
 from marl_airhockey.data import writer
 from marl_airhockey.data.derived import repaired
+from marl_airhockey.data.files import whole_recordings_in
 from marl_airhockey.data.parts import merge_parts, parts_of
 from marl_airhockey.data.reader import (
     episodes_of,
@@ -457,5 +458,9 @@ def test_steps_that_lack_at_the_end_are_named(tmp_path):
     (words,) = missing_steps(path).values()
     assert words == f"{path}: episode 2: 40 of its 60 steps are missing at the end"
     assert read_recording(path).episodes[2].reason == ""
+    with pytest.raises(ValueError, match=r"1 of its episodes lack .* data repair"):
+        whole_recordings_in([path])
+    assert repaired(path, tmp_path / "good") == [words]
+    assert len(read_recording(tmp_path / "good").episodes) == 2
     part.unlink()
     assert list(missing_steps(path)) == [0, 1, 2]

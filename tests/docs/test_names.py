@@ -18,7 +18,7 @@ from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.ppo_config import PPOConfig
-from marl_airhockey.world.build import Keywords
+from marl_airhockey.world.keywords import Keywords
 
 ROOT = Path(__file__).parents[2]
 PAGES = [

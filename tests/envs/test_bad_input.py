@@ -21,6 +21,11 @@ CORNERS = TABLES["standard"].vertices
 GOOD = {"paddle_0": np.zeros(2, np.float32)}
 
 
+def full_of(value):
+    """Return a player whose actions are a value."""
+    return lambda observation: np.full((len(observation), 2), value)
+
+
 @pytest.mark.parametrize(
     ("build", "words"),
     [
@@ -129,11 +134,81 @@ GOOD = {"paddle_0": np.zeros(2, np.float32)}
             "block_radius",
         ),
         (lambda: ah.load_policy("nowhere.zip"), "no such policy"),
+        (lambda: ah.parallel_env("juggle", profile=None), "profile: None is no name"),
+        (lambda: ah.make_vec("juggle", 2, control_dt="0.05"), "'0.05' is no time in s"),
+        (lambda: ah.gym_env("juggle", control_dt=True), "control_dt: True is no time"),
+        (lambda: ah.make_world("juggle", options=["lift"]), "options: .* is no dict"),
+        (lambda: ah.make_sb3_vec("juggle", substeps="2"), "substeps: '2' is no whole"),
+        (lambda: ah.make_vec("juggle", 2, backend=3), "backend: 3 is no name of a"),
+        (lambda: ah.make_vec("juggle", 2, physics={"tilt": "3"}), "'tilt'.*got '3'"),
+        (lambda: ah.make_vec("juggle", 2, physics={"tilt": True}), "'tilt'.*got True"),
+        (
+            lambda: ah.parallel_env("duel", seats="robot", options={"seats": "arcade"}),
+            "seats: given twice, 'robot' and in options 'arcade'",
+        ),
+        (
+            lambda: ah.gym_env("reach", goals="dict", options={"goals": "flat"}),
+            "goals: given twice",
+        ),
+        (lambda: ah.parallel_env("juggle", options={"pucks": 50}), "from 1 to 8"),
+        (
+            lambda: ah.parallel_env("hit_goal").reset(options={"radius": 0.5}),
+            "'radius' is a field of hit_goal; set it where",
+        ),
+        (
+            lambda: ah.make_vec("juggle", 2).reset(options=[1]),
+            "options: .1. is no dict",
+        ),
+        (
+            lambda: ah.make_vec("juggle", 2).reset(options={"reset_masks": [True] * 2}),
+            "unknown reset option 'reset_masks'",
+        ),
+        (lambda: ah.evaluate("striker"), "scenario: say what the driver is to play"),
+        (lambda: ah.evaluate("still", "touch", seed=[1, 2]), "seed: .1, 2. must be"),
+        (lambda: ah.evaluate("still", "touch", episodes=3.7), "episodes: 3.7 must be"),
+        (lambda: ah.evaluate(full_of(np.inf), "touch"), "no player .* such as .inf"),
+        (lambda: ah.evaluate(full_of(1j), "touch"), "no player .* of complex128"),
+        (lambda: ah.evaluate(full_of(True), "touch"), "no player .* of bool"),
+        (lambda: ah.evaluate(full_of("a"), "touch"), "no player .* of <U1"),
     ],
 )
 def test_it_is_refused_when_built(build, words):
     with pytest.raises(ValueError, match=words.replace("(", r"\(")):
         build()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "nothing in the file"),
+        ("ranges = 3", r"ranges: 3; expected a table, \[ranges\]"),
+        ("[ranges]\ntilt = [true, 3]", r"tilt: expected \[low, high\]"),
+        ("[ranges]\ntilt = [6, 3]", "is no range within"),
+        ("[ranges]\ntlt = [3, 6]", "did you mean 'tilt'"),
+        ('base = "nobody"', "unknown base 'nobody'"),
+        ("tilt =", "profile .*p.toml: "),
+    ],
+)
+def test_a_wrong_profile_file_is_named(text, words, tmp_path):
+    (tmp_path / "p.toml").write_text(text)
+    with pytest.raises(ValueError, match=words):
+        ah.parallel_env("touch", profile=str(tmp_path / "p.toml"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("", "no parameters in the file"), ('tilt = "3"', "got '3'"), ("x =", "no TOML")],
+)
+def test_a_wrong_physics_file_is_named(text, words, tmp_path):
+    (tmp_path / "g.toml").write_text(text)
+    with pytest.raises(ValueError, match=words):
+        ah.parallel_env("touch", physics=str(tmp_path / "g.toml"))
+
+
+def test_a_mask_needs_episodes_that_have_begun():
+    envs = ah.make_vec("touch", 2)
+    with pytest.raises(RuntimeError, match=r"reset_mask: call reset\(\)"):
+        envs.reset(options={"reset_mask": np.array([True, False])})
 
 
 def numeric_options():

@@ -9,6 +9,7 @@ import time
 
 import pytest
 import torch
+from filelock import FileLock
 from runs import SMALL, rows
 
 import marl_airhockey as ah
@@ -179,3 +180,80 @@ def test_evaluations_of_a_game_are_a_share_of_its_training():
     assert 1.5 * steps(whole) <= 0.2 * whole.total_steps
     chosen = preset("duel", {"total_steps": 600_000, "evaluations": 5})
     assert (chosen.evaluations, preset("touch").evaluations) == (5, 20)
+
+
+@pytest.fixture
+def begun_run(tmp_path):
+    """The folder of a run that was interrupted after its second evaluation."""
+
+    def interrupt(done, total, row):
+        if done > total / 2:
+            raise KeyboardInterrupt
+
+    steps = 2 * SMALL["total_steps"]
+    config = preset("touch", {**SMALL, "total_steps": steps, "evaluations": 4})
+    with pytest.raises(KeyboardInterrupt):
+        run_training(config, tmp_path / "run", interrupt)
+    return tmp_path / "run"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("state.json", "{", r"state.json is damaged \(Expecting property name"),
+        ("state.json", "{}", "state.json is damaged"),
+        ("state.json", None, r"state.json is damaged \(it is missing\)"),
+        ("evaluations.csv", "steps\n", "evaluations.csv is damaged"),
+        ("last.pt", "x", "last.pt: missing or damaged"),
+        ("last.pt", None, "last.pt: missing or damaged"),
+    ],
+)
+def test_a_damaged_run_is_not_resumed(begun_run, name, text, words):
+    best = (begun_run / "best.npz").read_bytes()
+    (begun_run / name).unlink()
+    if text is not None:
+        (begun_run / name).write_text(text)
+    with pytest.raises(ValueError, match=words):
+        run_training(None, begun_run)
+    assert (begun_run / "best.npz").read_bytes() == best
+
+
+def test_one_process_at_a_time_trains_in_a_folder(begun_run):
+    with (
+        FileLock(begun_run / ".lock"),
+        pytest.raises(RuntimeError, match="another process trains in it"),
+    ):
+        run_training(None, begun_run)
+    run_training(None, begun_run)
+
+
+def test_weights_of_another_size_are_named(begun_run, tmp_path):
+    config = preset("juggle", {**SMALL, "init": str(begun_run), "observe": "history"})
+    with pytest.raises(ValueError, match=r"another size; it is of another sc"):
+        run_training(config, tmp_path / "other")
+
+
+NO_NUMBER = """
+from dataclasses import dataclass
+import numpy as np
+from marl_airhockey.toolkit.falling import FallingPuck
+
+@dataclass(frozen=True, kw_only=True)
+class Bad(FallingPuck):
+    seconds: float = 1.0
+
+    def reward_terms(self, t):
+        return {"x": np.nan * t.after.time[..., None]}
+
+    def success(self, t):
+        return t.after.time > 9.0
+"""
+
+
+@pytest.mark.parametrize("engine", ["torch", "sb3"])
+def test_a_reward_that_is_no_number_is_named(engine, tmp_path):
+    file = tmp_path / f"bad_{engine}.py"
+    file.write_text(NO_NUMBER)
+    config = preset(str(file), {**SMALL, "engine": engine})
+    with pytest.raises(ValueError, match=r"reward terms \['x'\] are nan"):
+        run_training(config, tmp_path / "run")

@@ -70,7 +70,10 @@ def test_a_function_of_goals_and_one_of_pixels_drive():
 @pytest.mark.parametrize(
     ("player", "message"),
     [
-        (lambda seen: 1.0, r"shape \(\).*expected actions of shape \(3, 2\) or \(2,\)"),
+        (
+            lambda seen: 1.0,
+            r"shape \(\).*expected finite actions of shape \(3, 2\) or \(2,\)",
+        ),
         (lambda seen: seen["puck"], "IndexError"),
         (torch.nn.Linear(5, 2), "cannot be multiplied"),
         (7, "int 7 is no player"),

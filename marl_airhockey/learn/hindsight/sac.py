@@ -99,7 +99,10 @@ def build_model(config: HindsightConfig, env: AirHockeyVecEnv) -> OffPolicyAlgor
     # An episode can be learned from when it has ended.
     first = max(config.learning_starts, config.num_worlds * env.world.max_cycles)
     if config.total_steps <= first:
-        raise ValueError(f"total_steps: {config.total_steps} must be above {first}")
+        raise ValueError(
+            f"total_steps: {config.total_steps} must be above {first}, the steps of "
+            "random actions with which learning begins (learning_starts)"
+        )
     model = _algorithm(config.critics)(
         "MultiInputPolicy",
         env,

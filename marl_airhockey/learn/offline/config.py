@@ -10,7 +10,11 @@ from typing import Any, ClassVar
 
 from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.data.benchmark.build import built
-from marl_airhockey.data.files import recordings_in, shared_head, shown_name
+from marl_airhockey.data.files import (
+    shared_head,
+    shown_name,
+    whole_recordings_in,
+)
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
 
@@ -103,7 +107,7 @@ def offline_config(
     if algo not in ALGORITHMS:
         raise ValueError(unknown_name("algo", algo, ALGORITHMS))
     check_names(OfflineConfig, changes)
-    files = recordings_in([built(path) for path in data])
+    files = whole_recordings_in([built(path) for path in data])
     head = shared_head(files)
     goals = {"goals": head["goals"]} if "goals" in head else {}
     pixels = changes.get("observe", head["observe"]) == "pixels"
