@@ -14,7 +14,7 @@ TARGET ?= x86-64-v3
 export PYTHONDONTWRITEBYTECODE :=
 # The virtual lab runs in real time: nothing runs beside its tests. What the workers
 # would all compile is compiled before they start.
-REALTIME := tests/lab
+REALTIME := tests/hardware/lab
 TEST = $(BIN)/airhockey precompile --jobs $(JOBS) && $(BIN)/pytest -n $(JOBS) --ignore=$(REALTIME)
 
 help: ## Show what there is to make

@@ -7,8 +7,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from marl_airhockey.devices.hand import Hand, HandMotion
-from marl_airhockey.devices.hand_rig import HandRig
+from marl_airhockey.hardware.hand import Hand, HandMotion
+from marl_airhockey.hardware.hand_rig import HandRig
 from marl_airhockey.toolkit import (
     Array,
     Driver,

@@ -9,10 +9,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from marl_airhockey.devices.rig import Rig
-from marl_airhockey.devices.robot import DriverConfig, DriverState, Mounting, Robot
-from marl_airhockey.devices.robot.nominal import nominal_mounting, table_of
-from marl_airhockey.devices.robot.ur5e import PoseReader
+from marl_airhockey.hardware.rig import Rig
+from marl_airhockey.hardware.robot import DriverState, Mounting, Robot, RobotConfig
+from marl_airhockey.hardware.robot.nominal import nominal_mounting, table_of
+from marl_airhockey.hardware.robot.ur5e import PoseReader
 from marl_airhockey.toolkit import (
     Array,
     Driver,
@@ -153,9 +153,9 @@ class Ur5e(Driver):
     def _connect_robot(self) -> Robot:
         if self._robot is None:
             config = (
-                self._rig.driver_config(self._reach)
+                self._rig.robot_config(self._reach)
                 if self._rig
-                else DriverConfig(self._host, _mounted(self._mounting), self._reach)
+                else RobotConfig(self._host, _mounted(self._mounting), self._reach)
             )
             robot = Robot(config)
             robot.connect()

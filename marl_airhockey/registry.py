@@ -11,6 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
+from marl_airhockey.backends.find import simulated_backend, simulated_names
 from marl_airhockey.contracts.backend import Backend
 from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.contracts.scenario import GoalScenario, Scenario
@@ -21,7 +22,9 @@ from marl_airhockey.policies.callables import driver_of
 from marl_airhockey.policies.load import ZOO, load_policy
 
 DEFAULT_BACKEND = "numba"
-"""Name of the backend that is used unless another is asked for."""
+"""Name of the backend that is used unless another is given"""
+REAL = "real"
+"""Name of the backend of a real table"""
 
 
 def _load(kind: str, folder: str, name: str, names: list[str]) -> ModuleType:
@@ -74,8 +77,8 @@ def agent_class(name: str) -> type[Driver]:
 
 
 def backend_names() -> list[str]:
-    """Return the names of all backends: the folders of ``backends/``."""
-    return names_in("backends")
+    """Return the names of all backends, the simulated ones and "real"."""
+    return sorted([*simulated_names(), REAL])
 
 
 def make_scenario(name: str, **options: Any) -> Scenario:
@@ -235,14 +238,20 @@ def _option(part: str) -> tuple[str, str | float]:
 
 
 def find_backend(name: str) -> type[Backend]:
-    """Return the backend class of ``backends/<name>/``.
+    """Return the class of a backend.
 
     Raises:
-        ValueError: an unknown name.
-        RuntimeError: it cannot run here; the message says the fix.
+        ValueError: An unknown name.
+        RuntimeError: It cannot run here; the message says the fix.
     """
-    module = _load("backend", "backends", name, backend_names())
-    backend = cast(type[Backend], module.make)
+    if name not in backend_names():
+        raise ValueError(unknown_name("backend", name, backend_names()))
+    if name == REAL:
+        from marl_airhockey.hardware.table.backend import RealBackend
+
+        backend: type[Backend] = RealBackend
+    else:
+        backend = simulated_backend(name)
     reason = backend.available()
     if reason:
         raise RuntimeError(f"backend {name!r}: {reason}")

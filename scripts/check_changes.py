@@ -68,7 +68,7 @@ def main() -> None:
     # A folder holds its files.
     tests = {t for t in tests if str(Path(t).parent) not in tests}
     # The tests of the lab run alone, because it runs in real time.
-    lab = {t for t in tests if t.startswith("tests/lab")}
+    lab = {t for t in tests if t.startswith("tests/hardware/lab")}
     for some, workers in ((tests - lab, ("-n", "2")), (lab, ())):
         if some:
             failed |= run(TOOLS / "pytest", *workers, "-m", "not slow", *sorted(some))

@@ -35,7 +35,7 @@ MOST_LINES = 300
 LONG = {
     "backends/numba/busy.py": "the broad phase, whose bounds share one derivation",
     "backends/pymunk/space.py": "one space with the callbacks of its collisions",
-    "backends/real/backend.py": "the life of one table's devices, from start to stop",
+    "hardware/table/backend.py": "the life of one table's devices, from start to stop",
     "contracts/scenario.py": "a contract with the methods that all scenarios share",
     "toolkit/observables.py": "twelve observables of some 25 lines each",
     "world/world.py": "one class, which all environments are views of",
@@ -55,7 +55,7 @@ def modules(path):
 
 def test_scenarios_and_agents_import_the_toolkit_alone():
     # A driver that owns a device imports that, too.
-    may = {"scenarios": ("toolkit",), "agents": ("toolkit", "devices")}
+    may = {"scenarios": ("toolkit",), "agents": ("toolkit", "hardware")}
     for path in (path for folder in LEAVES for path in folder.glob("*.py")):
         allowed = tuple(f"marl_airhockey.{name}" for name in may[path.parent.name])
         for module in modules(path):

@@ -8,7 +8,7 @@ import numpy as np
 import rtde_control
 import rtde_receive
 
-from marl_airhockey.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
 
 ADDRESS = "127.0.0.29"
 airhockey = Path(sys.executable).with_name("airhockey")

@@ -11,7 +11,7 @@ from marl_airhockey.cli.real_table import rig_of
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.seat import make_seat
 from marl_airhockey.core.table import TABLES
-from marl_airhockey.devices.rig import Rig
+from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.types import Array
 
 
@@ -31,7 +31,7 @@ def moving_arm(
         motions that are done.
     """
     require("rtde_control", "hardware")
-    from marl_airhockey.backends.real.operator import make_operator
+    from marl_airhockey.hardware.table.operator import make_operator
 
     with rig_of(lab, rig) as path:
         known = Rig.load(path)

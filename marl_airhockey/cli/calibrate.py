@@ -15,13 +15,13 @@ from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.core.errors import require
 from marl_airhockey.core.table import TABLES
-from marl_airhockey.devices.camera import Camera, open_source
-from marl_airhockey.devices.vision.calibration import tag_corners
+from marl_airhockey.hardware.camera import Camera, open_source
+from marl_airhockey.hardware.vision.calibration import tag_corners
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
-    from marl_airhockey.lab.calibration.hand_session import HandSession
-    from marl_airhockey.lab.lab import LabClient
+    from marl_airhockey.hardware.calibration.hand_session import HandSession
+    from marl_airhockey.hardware.lab.lab import LabClient
 
 TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)
 """Pose of the paddle's foot in the flange's frame, m and rad"""
@@ -63,7 +63,7 @@ def open_calibration(
         return
     require("starlette", "play")
     require("uvicorn", "play")
-    from marl_airhockey.lab.calibration.server import application
+    from marl_airhockey.hardware.calibration.server import application
 
     if hand:
         path = Path("hand.json") if out == Path("rig.json") else out
@@ -74,7 +74,7 @@ def open_calibration(
             )
         return
     require("rtde_receive", "hardware")
-    from marl_airhockey.lab.calibration.session import CalibrationSession
+    from marl_airhockey.hardware.calibration.session import CalibrationSession
 
     if table not in TABLES:
         raise ValueError(f"--table {table!r}: there are {', '.join(TABLES)}")
@@ -88,7 +88,7 @@ def open_calibration(
             pose = _pose_reader(address)
             session = CalibrationSession(opened, pose, rig, out, measured)
             if client is not None:
-                from marl_airhockey.lab.calibration.helper import Helper
+                from marl_airhockey.hardware.calibration.helper import Helper
 
                 session.orders.update(Helper(client).orders)
             cli_play.host_table(
@@ -102,14 +102,14 @@ def _hand_session(
     camera: str, size: tuple[float, float], out: Path, tags: Path | None, lab: bool
 ) -> Iterator[HandSession]:
     """Give the session of a hand's camera; in a lab, with its hand."""
-    from marl_airhockey.lab.calibration.hand_session import HandSession
+    from marl_airhockey.hardware.calibration.hand_session import HandSession
 
     measured = _read_tags(tags) if tags else None
     with ExitStack() as stack:
         orders: dict[str, Callable[..., None]] = {}
         if lab:
-            from marl_airhockey.lab.calibration.helper import HandHelper
-            from marl_airhockey.lab.calibration.lab_rig import running_lab
+            from marl_airhockey.hardware.calibration.helper import HandHelper
+            from marl_airhockey.hardware.calibration.lab_rig import running_lab
 
             helper = HandHelper(stack.enter_context(running_lab()))
             camera, orders = helper.source, helper.orders
@@ -139,7 +139,7 @@ def sheets(
     folder: Annotated[Path, typer.Argument(help="Where they are written.")] = Path(),
 ) -> None:
     """Write the tags and the ChArUco board as PDF files for A4 paper."""
-    from marl_airhockey.lab.calibration.sheets import write_sheets
+    from marl_airhockey.hardware.calibration.sheets import write_sheets
 
     for path in write_sheets(folder):
         console.print(f"wrote {path}")
@@ -154,7 +154,7 @@ def _devices(
         yield camera, robot, "person", None
         return
     require("rtde_receive", "hardware")
-    from marl_airhockey.lab.calibration.lab_rig import running_lab
+    from marl_airhockey.hardware.calibration.lab_rig import running_lab
 
     with (
         waiting("opening the lab (longer when it is the first time)"),
@@ -167,7 +167,7 @@ def _devices(
 
 def _pose_reader(address: str) -> Callable[[], Array]:
     """Return a function that reads the pose of an arm's tool."""
-    from marl_airhockey.devices.robot.ur5e import PoseReader
+    from marl_airhockey.hardware.robot.ur5e import PoseReader
 
     return PoseReader(address).pose
 

@@ -19,7 +19,7 @@ from marl_airhockey.core.servo import HALF
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
-    from marl_airhockey.lab.calibration.arm import ArmTrial
+    from marl_airhockey.hardware.calibration.arm import ArmTrial
 
 NAMES = "action_delay", "servo_time"
 """Parameters that are measured"""
@@ -40,7 +40,7 @@ def arm(
 
     It moves along both axes of the table, by 8 cm to each side and as far as 0.4 m/s.
     """
-    from marl_airhockey.lab.calibration.arm import measure_arm
+    from marl_airhockey.hardware.calibration.arm import measure_arm
 
     with moving_arm(lab, rig, 4 * repeats) as (known, _, tell):
         trials = measure_arm(known, repeats, tell)

@@ -17,7 +17,7 @@ from marl_airhockey.cli.real_table import LabOption
 from marl_airhockey.core.errors import require
 
 if TYPE_CHECKING:
-    from marl_airhockey.lab.calibration.delay import Delays
+    from marl_airhockey.hardware.calibration.delay import Delays
 
 NAMES = "camera", "arm", "round trip"
 """Delays that are measured"""
@@ -39,7 +39,7 @@ def delay(
     The arm goes to and fro by 9 cm; a camera of this machine gets its latency written
     into the rig's file.
     """
-    from marl_airhockey.lab.calibration.delay import measure_delays
+    from marl_airhockey.hardware.calibration.delay import measure_delays
 
     with moving_arm(lab, rig, trials) as (known, path, tell):
         found = measure_delays(known, trials, tell)

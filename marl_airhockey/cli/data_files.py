@@ -108,7 +108,7 @@ def extract(
     require("matplotlib", "train")
     from marl_airhockey.data.extract import extract as find_trajectories
     from marl_airhockey.data.plots import plot_trajectories
-    from marl_airhockey.devices.rig import Rig
+    from marl_airhockey.hardware.rig import Rig
 
     found = find_trajectories(video, Rig.load(rig) if rig else None)
     folder = out or video.parent

@@ -29,7 +29,6 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.cli.real_table import (
-    REAL,
     LabOption,
     RigOption,
     name_on_table,
@@ -44,7 +43,7 @@ from marl_airhockey.evaluation.evaluate import (
 )
 from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.policies.policy import Policy
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_agent
 
 FLOORS = ("still", "random", "sticky")
 """Drivers without skill that results are compared with."""

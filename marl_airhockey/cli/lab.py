@@ -11,11 +11,11 @@ import typer
 from marl_airhockey.cli import play as cli_play
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.cli.real_table import REAL, name_on_table, real_table
+from marl_airhockey.cli.real_table import name_on_table, real_table
 from marl_airhockey.core.errors import require
-from marl_airhockey.lab.faults import FAULTS
-from marl_airhockey.lab.setup import LabSetup
-from marl_airhockey.registry import find_backend
+from marl_airhockey.hardware.lab.faults import FAULTS
+from marl_airhockey.hardware.lab.setup import LabSetup
+from marl_airhockey.registry import REAL, find_backend
 from marl_airhockey.world.keywords import Keywords
 
 GAME, PLAYER = "juggle", "zoo/juggle"
@@ -47,7 +47,7 @@ def open_lab(
     """
     if context.invoked_subcommand is not None:
         return
-    from marl_airhockey.lab.lab import Lab, LabClient, served
+    from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
 
     if plant == REAL:
         raise ValueError("--plant real: the lab is what stands in for a real table")
@@ -94,7 +94,7 @@ def fault(
     off: Annotated[bool, typer.Option("--off", help="End it.")] = False,
 ) -> None:
     """Let something go wrong in the running lab."""
-    from marl_airhockey.lab.lab import LabClient
+    from marl_airhockey.hardware.lab.lab import LabClient
 
     if name is None:
         for known, words in FAULTS.items():

@@ -23,10 +23,10 @@ from marl_airhockey.cli.options import (
     settings,
 )
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
+from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_agent
 from marl_airhockey.world.keywords import Keywords
 
 if TYPE_CHECKING:
@@ -183,8 +183,8 @@ def lab_plant(operator: str) -> Iterator[Plant]:
     Args:
         operator: see `rig.Rig.operator`.
     """
-    from marl_airhockey.lab.faults import FAULTS
-    from marl_airhockey.lab.lab import LabClient
+    from marl_airhockey.hardware.lab.faults import FAULTS
+    from marl_airhockey.hardware.lab.lab import LabClient
     from marl_airhockey.play.open_table import Plant
 
     kind, _, port = operator.partition(":")

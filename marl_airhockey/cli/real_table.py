@@ -10,12 +10,10 @@ from typing import Annotated
 import typer
 
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.registry import zoo_names
+from marl_airhockey.registry import REAL, zoo_names
 from marl_airhockey.world.build import table_keywords
 from marl_airhockey.world.keywords import Keywords
 
-REAL = "real"
-"""Name of the backend that is a real table"""
 SUFFIX = "_full_size"
 """Ending of the names of policies of the zoo that were trained for the real table"""
 
@@ -79,7 +77,7 @@ def rig_of(lab: bool, rig: Path | None) -> Iterator[Path]:
         return
     if not lab:
         raise ValueError("which real table? --lab, or --rig FILE")
-    from marl_airhockey.lab.calibration.lab_rig import lab_rig
+    from marl_airhockey.hardware.calibration.lab_rig import lab_rig
 
     with waiting("opening the lab (longer when it is the first time)"):
         opened = lab_rig()

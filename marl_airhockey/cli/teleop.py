@@ -17,8 +17,9 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.cli.real_table import REAL, LabOption, RigOption, real_table
+from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
 from marl_airhockey.core.errors import require
+from marl_airhockey.registry import REAL
 
 
 def teleop(
@@ -97,7 +98,7 @@ def hand_file(wanted: bool, hand: Path | None, lab: bool) -> Iterator[Path | Non
         return
     if not lab:
         raise ValueError("--by shadow: which camera? --hand FILE, or --lab")
-    from marl_airhockey.lab.calibration.lab_rig import hand_rig
+    from marl_airhockey.hardware.calibration.lab_rig import hand_rig
 
     with waiting("opening the lab (longer when it is the first time)"):
         opened = hand_rig()

@@ -50,9 +50,9 @@ def open_emulator(
     if context.invoked_subcommand is not None:
         return
     _check_loopback(address)
-    from marl_airhockey.lab.setup import LabSetup
-    from marl_airhockey.lab.ur_controller.controller import Controller
-    from marl_airhockey.lab.ur_controller.emulator import (
+    from marl_airhockey.hardware.lab.setup import LabSetup
+    from marl_airhockey.hardware.ur_emulator.controller import Controller
+    from marl_airhockey.hardware.ur_emulator.emulator import (
         ScheduledFault,
         parse_version,
         serve_emulator,
@@ -84,7 +84,7 @@ def switch_fault(
     address: Address = ADDRESS,
 ) -> None:
     """Switch a fault of the running emulator on or off."""
-    from marl_airhockey.lab.ur_controller.faults import FAULTS
+    from marl_airhockey.hardware.ur_emulator.faults import FAULTS
 
     if name is None:
         for known, row in FAULTS.items():
@@ -110,8 +110,8 @@ def _ask(address: str, do: str, **order: Any) -> dict[str, Any]:
     Raises:
         RuntimeError: There is none.
     """
-    from marl_airhockey.lab.door import DoorClient, port_in
-    from marl_airhockey.lab.ur_controller.emulator import door_file
+    from marl_airhockey.hardware.lab.door import DoorClient, port_in
+    from marl_airhockey.hardware.ur_emulator.emulator import door_file
 
     port = port_in(door_file(address))
     try:

@@ -16,12 +16,12 @@ from marl_airhockey.core.table import TABLES
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import episodes_without_film
 from marl_airhockey.data.reader import read_recording
-from marl_airhockey.devices.camera import FileSource, Frame
-from marl_airhockey.devices.camera.film import read_times
-from marl_airhockey.devices.rig import Rig
-from marl_airhockey.devices.rig_file import rig_fields
-from marl_airhockey.devices.vision import Detector
-from marl_airhockey.devices.vision.calibration import view_trouble
+from marl_airhockey.hardware.camera import FileSource, Frame
+from marl_airhockey.hardware.camera.film import read_times
+from marl_airhockey.hardware.rig import Rig
+from marl_airhockey.hardware.rig_file import rig_fields
+from marl_airhockey.hardware.vision import Detector
+from marl_airhockey.hardware.vision.calibration import view_trouble
 from marl_airhockey.types import Array
 
 LOOKED = 5

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from marl_airhockey.core.recording import FILM, Columns, Episode
-from marl_airhockey.devices.camera import Film
+from marl_airhockey.hardware.camera import Film
 from marl_airhockey.types import Array
 
 

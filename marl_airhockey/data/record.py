@@ -13,7 +13,7 @@ from marl_airhockey.data.derived import resume
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
-from marl_airhockey.devices.camera import Film
+from marl_airhockey.hardware.camera import Film
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.rollout.columns import (
     episode_notes,
@@ -174,7 +174,7 @@ def _camera(world: World) -> Any:
     Raises:
         ValueError: There is no camera.
     """
-    from marl_airhockey.backends.real.backend import RealBackend
+    from marl_airhockey.hardware.table.backend import RealBackend
 
     if not isinstance(world.backend, RealBackend):
         raise ValueError("--film: only a real table has a camera; add --backend real")

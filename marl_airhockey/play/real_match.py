@@ -10,8 +10,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from marl_airhockey.backends.real.backend import RealBackend
-from marl_airhockey.backends.real.operator import Operator, make_operator
+from marl_airhockey.hardware.table.backend import RealBackend
+from marl_airhockey.hardware.table.operator import Operator, make_operator
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.live_match import COUNTDOWN, LiveMatch
 from marl_airhockey.types import Array

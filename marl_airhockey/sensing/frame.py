@@ -17,7 +17,7 @@ SAME_FRAME = 1e-4
 """Largest time between two readings of the same frame (s)."""
 
 
-class View(NamedTuple):
+class CameraPast(NamedTuple):
     """Past of B worlds and what a camera sees of it; n bodies are tracked."""
 
     past: Array
@@ -83,7 +83,7 @@ def take(
     velocity: Array,
     time: Array,
     errors: Errors,
-    view: View,
+    view: CameraPast,
     newest: Newest,
 ) -> None:
     """Take a frame of some worlds: fill ``newest`` and update ``view``.
@@ -135,7 +135,7 @@ def _detect(
     y: float,
     unit: Array,
     errors: Errors,
-    view: View,
+    view: CameraPast,
     newest: Newest,
     row: int,
 ) -> None:

@@ -65,7 +65,7 @@ class SimulatedCamera:
         extent = np.abs(np.asarray(table.vertices)).max(0)
         self.calibration = CalibrationMap(b, 2 * extent[1])
         stored = max(round(PAST / control_dt), 2)
-        self._view = frame.View(
+        self._view = frame.CameraPast(
             past=np.zeros((b, depth(longest, control_dt), n, 4)),
             paddles=np.zeros((b, stored, bodies.paddles, 2)),
             waves=self.calibration.waves,

@@ -3,10 +3,11 @@
     python scripts/bench/lab_faults.py --out docs/data/lab_faults.json
 
 The learned juggler plays through camera and arm; after a second one or two faults are
-switched on; those that others have reported (`tests/lab/test_fault_atlas.py`) are left
-out. Printed are the reason with which the episode ends, the time until then and
-until the true paddle rests for good (below 0.01 m/s), and how far it moved on after the
-episode's end. "plays on" is for what ends no episode within the time that is listened.
+switched on; those that others have reported, see
+`tests/hardware/lab/test_fault_atlas.py`, are left out. Printed are the reason with
+which the episode ends, the time until then and until the true paddle rests for good
+(below 0.01 m/s), and how far it moved on after the episode's end. "plays on" is for
+what ends no episode within the time that is listened.
 It takes about 25 minutes, with ``--alone`` four, in real time: nothing else should run
 meanwhile. Faults whose rows are in the file are not measured again, so the script can
 be stopped and started; ``--summary`` prints the pairs of the file by reason.
@@ -25,11 +26,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
+from marl_airhockey.hardware.lab.faults import ARM_FAULTS, TABLE_FAULTS
+from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
+from marl_airhockey.hardware.ur_emulator.faults import FAULTS
 from marl_airhockey.jit.folders import cache_folder
-from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
-from marl_airhockey.lab.faults import ARM_FAULTS, TABLE_FAULTS
-from marl_airhockey.lab.lab import Lab, LabClient, served
-from marl_airhockey.lab.ur_controller.faults import FAULTS
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.types import Array
 from marl_airhockey.world.build import build_driven_world

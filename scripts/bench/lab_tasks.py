@@ -17,9 +17,9 @@ from contextlib import closing
 from pathlib import Path
 
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
+from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
+from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
 from marl_airhockey.jit.folders import cache_folder
-from marl_airhockey.lab.calibration.lab_rig import calibrate_lab
-from marl_airhockey.lab.lab import Lab, LabClient, served
 from marl_airhockey.sensing.simulated_camera import SENSED
 
 TASKS = ("reach", "reach_velocity", "touch", "juggle", "puck_velocity")

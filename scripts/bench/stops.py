@@ -30,8 +30,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.devices.robot import DriverConfig, DriverState, Robot
-from marl_airhockey.lab.lab import Lab
+from marl_airhockey.hardware.lab.lab import Lab
+from marl_airhockey.hardware.robot import DriverState, Robot, RobotConfig
 from marl_airhockey.types import Array
 
 SPEED = 0.5
@@ -62,7 +62,7 @@ class Report(NamedTuple):
     """Time at which the driver began to brake of its own, s"""
 
 
-def run_caller(config: DriverConfig, start: Array, pipe: Connection) -> None:
+def run_caller(config: RobotConfig, start: Array, pipe: Connection) -> None:
     """Command a velocity until the pipe says which other, or None for no more."""
     with Robot(config) as robot:
         while robot.state is DriverState.FAULT:
@@ -102,7 +102,7 @@ class Trial:
 
     def __init__(self, lab: Lab) -> None:
         self.lab, setup = lab, lab.setup
-        config = DriverConfig(lab.host, setup.mounting, setup.seat.reach)
+        config = RobotConfig(lab.host, setup.mounting, setup.seat.reach)
         context = multiprocessing.get_context("spawn")
         self._pipe, end = context.Pipe()
         start = setup.home - (0.0, 0.2)

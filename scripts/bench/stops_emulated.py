@@ -21,9 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.lab.emulated_robot import EmulatedRobot
-from marl_airhockey.lab.ur_controller.arm import DT
-from marl_airhockey.lab.ur_controller.motions import Halt
+from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.hardware.ur_emulator.arm import DT
+from marl_airhockey.hardware.ur_emulator.motions import Halt
 from marl_airhockey.types import Array
 
 CONTROL_DT = 0.05

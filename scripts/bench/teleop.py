@@ -28,10 +28,10 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.lab.calibration.delay import find_delay
-from marl_airhockey.lab.calibration.lab_rig import hand_rig, lab_rig, running_lab
-from marl_airhockey.lab.hand_camera import FIELD
-from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.hardware.calibration.delay import find_delay
+from marl_airhockey.hardware.calibration.lab_rig import hand_rig, lab_rig, running_lab
+from marl_airhockey.hardware.lab.hand_camera import FIELD
+from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.types import Array
 
 ARGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]

@@ -21,9 +21,9 @@ import matplotlib as mpl
 import numpy as np
 import typer
 
-from marl_airhockey.devices.robot import FILTERS, DriverConfig, Robot, Smoothing
-from marl_airhockey.lab.emulated_robot import EmulatedRobot
-from marl_airhockey.lab.lab import Lab
+from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.hardware.lab.lab import Lab
+from marl_airhockey.hardware.robot import FILTERS, Robot, RobotConfig, Smoothing
 from marl_airhockey.types import Array
 
 mpl.use("Agg")
@@ -77,7 +77,7 @@ def in_emulated_time(smoothing: Smoothing) -> Record:
 def in_real_time(lab: Lab, smoothing: Smoothing) -> Record:
     """Return the record of a robot whose driver and controller are processes."""
     setup = lab.setup
-    config = DriverConfig(
+    config = RobotConfig(
         *(lab.host, setup.mounting, setup.seat.reach), smoothing=smoothing
     )
     commands, paddle = [], []

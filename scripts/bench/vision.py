@@ -18,22 +18,27 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from marl_airhockey.backends.real.tracker import Tracker
 from marl_airhockey.core.physics import Physics
-from marl_airhockey.devices.camera import Frame
-from marl_airhockey.devices.robot.nominal import BEHIND
-from marl_airhockey.devices.vision import Colour, Detector, Sighting
-from marl_airhockey.devices.vision.calibration import (
+from marl_airhockey.hardware.camera import Frame
+from marl_airhockey.hardware.lab.setup import LabSetup
+from marl_airhockey.hardware.lab.table_camera import (
+    Seen,
+    TableCamera,
+    lab_view,
+    tag_places,
+)
+from marl_airhockey.hardware.lab.world import RATE, LabWorld
+from marl_airhockey.hardware.robot.nominal import BEHIND
+from marl_airhockey.hardware.table.tracker import Tracker
+from marl_airhockey.hardware.vision import Colour, Detector, Sighting
+from marl_airhockey.hardware.vision.calibration import (
     find_tags,
     tag_corners,
     view_from_clicks,
     view_from_tags,
 )
-from marl_airhockey.devices.vision.edges import refine_corners
-from marl_airhockey.devices.vision.lens import View
-from marl_airhockey.lab.setup import LabSetup
-from marl_airhockey.lab.table_camera import Seen, TableCamera, lab_view, tag_places
-from marl_airhockey.lab.world import RATE, LabWorld
+from marl_airhockey.hardware.vision.edges import refine_corners
+from marl_airhockey.hardware.vision.lens import CameraView
 from marl_airhockey.types import Array
 
 SERVE = 5.0
@@ -68,7 +73,7 @@ class Sweep:
         return place, self._size * rate * np.cos(rate * now)
 
 
-def calibrations(camera: TableCamera, setup: LabSetup) -> dict[str, View]:
+def calibrations(camera: TableCamera, setup: LabSetup) -> dict[str, CameraView]:
     """Return views by the way in which they were found."""
     table, true = setup.geometry, lab_view(setup.geometry)
     away = Seen(None, np.zeros(2), setup.home, np.zeros(2))
@@ -113,7 +118,7 @@ def film(setup: LabSetup, seconds: float, rate: float) -> list[Shot]:
 
 
 def measure(
-    view: View, setup: LabSetup, shots: list[Shot], colour: Colour
+    view: CameraView, setup: LabSetup, shots: list[Shot], colour: Colour
 ) -> dict[str, float]:
     """Return the errors of one view on pictures."""
     table = setup.geometry

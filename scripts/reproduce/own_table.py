@@ -37,8 +37,8 @@ from marl_airhockey.evaluation.comparison import (
 )
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
-from marl_airhockey.lab.setup import LabSetup
-from marl_airhockey.lab.world import LabWorld
+from marl_airhockey.hardware.lab.setup import LabSetup
+from marl_airhockey.hardware.lab.world import LabWorld
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy

@@ -3,7 +3,7 @@
     python scripts/reproduce/smoothing.py
 
 A learned policy plays its task while its paddle is the tool of an emulated arm: its
-actions go through a filter (`devices/robot/filters.py`), the driver and the emulated
+actions go through a filter (`hardware/robot/filters.py`), the driver and the emulated
 controller, in emulated time. Measured are the success, the acceleration and the jerk of
 the tool as it truly moved, over 10 ms, and how often the arm ended
 in a protective stop, which fails the episode. "chatter" is the same policy with each
@@ -27,11 +27,11 @@ from rows import DATA, Again, Book, Row, RowsFile
 from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
 from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.core.seat import Seat
-from marl_airhockey.devices.robot import PRESETS, DriverState, Preset, Smoothing
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.lab.emulated_robot import EmulatedRobot
-from marl_airhockey.lab.setup import LabSetup
+from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.hardware.lab.setup import LabSetup
+from marl_airhockey.hardware.robot import PRESETS, DriverState, Preset, Smoothing
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.rollout import play as episodes_of
 from marl_airhockey.types import Array

@@ -40,7 +40,7 @@ from marl_airhockey.data.benchmark.build import get_dataset
 from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.data.record import record_steps
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
-from marl_airhockey.lab.calibration.lab_rig import lab_rig
+from marl_airhockey.hardware.calibration.lab_rig import lab_rig
 from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training

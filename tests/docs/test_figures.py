@@ -9,9 +9,9 @@ from statistics import mean
 
 import pytest
 
-from marl_airhockey.devices.rig import LATEST
-from marl_airhockey.devices.robot import MotionLimits
 from marl_airhockey.evaluation.stats import interval
+from marl_airhockey.hardware.rig import LATEST
+from marl_airhockey.hardware.robot import MotionLimits
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "docs/data"

@@ -32,7 +32,7 @@ COMMAND = re.compile(
 )
 WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 FILE = re.compile(r"\.(?:py|pyi|md|js|csv|json|toml|npz|png|gif|parquet|pdf|onnx|zip)$")
-PLACES = ["", "docs", "marl_airhockey", "tests", "marl_airhockey/devices/robot"]
+PLACES = ["", "docs", "marl_airhockey", "tests", "marl_airhockey/hardware/robot"]
 """Folders in which files that pages name are looked for"""
 FOREIGN = {
     *("GymEnv", "PettingZooWrapper", "peft", "return_state", "team_k"),

@@ -32,7 +32,7 @@ PROGRAMS = {
     "record": COMMAND.format("data record still -s touch --episodes 1 --out one"),
     "numba": PLAY.format("numba"),
     "pymunk": PLAY.format("pymunk"),
-    "camera": "import marl_airhockey.devices.camera",
+    "camera": "import marl_airhockey.hardware.camera",
 }
 
 

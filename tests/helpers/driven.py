@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from marl_airhockey.lab.emulated_robot import EmulatedRobot
+from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
 
 STEP = 0.05
 UP = np.array([0.0, 0.5])

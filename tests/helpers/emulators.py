@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
-from marl_airhockey.lab.door import DoorClient, port_in
-from marl_airhockey.lab.ur_controller.emulator import door_file
+from marl_airhockey.hardware.lab.door import DoorClient, port_in
+from marl_airhockey.hardware.ur_emulator.emulator import door_file
 
 ADDRESS = "127.0.0.28"
 

@@ -16,14 +16,12 @@ from marl_airhockey.core.state import RESULTS, Kind
 from marl_airhockey.data.exchange.measured_events import Path, fill_events
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.writer import RecordingWriter
-from marl_airhockey.registry import make_scenario
+from marl_airhockey.registry import REAL, make_scenario
 from marl_airhockey.rollout.columns import SENSED, STATE, scenario_of
 from marl_airhockey.types import Array
 
 BEYOND = 0.1
 """Largest distance of a measured body beyond the table's edge, m"""
-BACKEND = "real"
-"""Backend of measured recordings: their states are known, and not simulated again"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ def recorded_scenario(path: pathlib.Path, head: dict[str, Any]) -> Scenario:
 def measured_head(settings: ImportSettings, control_dt: float) -> dict[str, object]:
     """Return the head of a recording of measured episodes."""
     scenario = scenario_for(settings)
-    known = {"control_dt": control_dt, "backend": BACKEND}
+    known = {"control_dt": control_dt, "backend": REAL}
     cycles = round(scenario.seconds / control_dt)
     return {**settings.head("measured", known), "max_cycles": cycles, "physics": None}
 

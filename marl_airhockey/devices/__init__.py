@@ -1,1 +1,0 @@
-"""Devices: cameras, vision and robots."""

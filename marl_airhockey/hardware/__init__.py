@@ -1,0 +1,1 @@
+"""Hardware: cameras, robots and the table that they make, real or emulated."""

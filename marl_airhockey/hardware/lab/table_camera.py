@@ -1,0 +1,150 @@
+"""Table's camera: frames of the lab's table, which the arm hides in part."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from marl_airhockey.core.table import Table
+from marl_airhockey.hardware.lab.camera import (
+    CIRCLE,
+    FELT,
+    LINES,
+    PADDLE,
+    PADDLE_TOP,
+    SHADOW,
+    LabCamera,
+)
+from marl_airhockey.hardware.lab.drawing import draw_polygon, fill, paste_tag, shade
+from marl_airhockey.hardware.vision.lens import CameraView, Lens
+from marl_airhockey.types import Array
+
+PUCK, ARM = (42, 40, 205), (96, 92, 90)
+"""Colours: blue, green, red"""
+TAGS_BESIDE = 0.075
+"""Distance of the tags' centres from the table's edge, m"""
+PUCK_HEIGHT = 0.003
+"""Height of a puck's rim, m"""
+ARM_HEIGHTS = np.array([0.10, 0.10, 0.35, 0.35])
+"""Heights of the corners of the arm's last link above the table, m"""
+
+
+def lab_view(table: Table) -> CameraView:
+    """Return the true view of the lab's camera above its table."""
+    focal = 602.0 * 1.9304 / max(table.size[0], 1.2)
+    matrix = ((focal, 0.0, 322.0), (0.0, focal, 243.0), (0.0, 0.0, 1.0))
+    lens = Lens(matrix, (-0.10, 0.04, 0.0, 0.0, 0.0), (640, 480))
+    rotation, _ = cv2.Rodrigues(np.array([np.pi + 0.06, 0.03, 0.02]))
+    vector, _ = cv2.Rodrigues(rotation)
+    centre = np.array([-0.03, 0.05, 2.15])
+    x, y, z = (float(v) for v in vector[:, 0])
+    tx, ty, tz = (float(v) for v in -rotation @ centre)
+    return CameraView(lens, (x, y, z), (tx, ty, tz))
+
+
+def tag_places(table: Table) -> dict[int, Array]:
+    """Return the centres (2,) of the tags around a table, m, by their numbers."""
+    x, y = table.size / 2
+    along = np.linspace(-0.86 * x, 0.86 * x, 4)
+    sides = [(float(a), s * (float(y) + TAGS_BESIDE)) for s in (1, -1) for a in along]
+    return {k: np.array(centre) for k, centre in enumerate(sides)}
+
+
+@dataclass
+class Seen:
+    """Moving bodies in the middle of an exposure, table frame."""
+
+    puck: Array | None
+    """(2,) position of the puck, m; None if it is not on the table"""
+    puck_velocity: Array
+    """(2,) velocity of the puck, m/s"""
+    paddle: Array
+    """(2,) position of the paddle, m"""
+    paddle_velocity: Array
+    """(2,) velocity of the paddle, m/s"""
+
+
+class TableCamera(LabCamera[Seen]):
+    """Camera above a simulated table.
+
+    Args:
+        table: Table in the view.
+        view: View of the camera.
+        base: (2,) position of the arm's base, table frame, m.
+        exposure: Exposure time, s.
+        seed: Seed of the image noise.
+    """
+
+    def __init__(
+        self,
+        table: Table,
+        view: CameraView,
+        base: Array,
+        exposure: float = 1 / 120,
+        seed: int = 0,
+    ) -> None:
+        self._table, self._base = table, np.asarray(base)
+        self.left: Array | None = None
+        """(2,) position of a second puck at rest, m; None without one."""
+        super().__init__(view, exposure, seed)
+
+    def _draw_still(self, scene: Array, view: CameraView) -> None:
+        fill(scene, view, np.asarray(self._table.vertices), 0.0, FELT)
+        fill(scene, view, 0.12 * CIRCLE, 0.0, LINES)
+        fill(scene, view, 0.115 * CIRCLE, 0.0, FELT)
+        y = float(self._table.size[1]) / 2
+        middle = np.array([(-0.003, -y), (0.003, -y), (0.003, y), (-0.003, y)])
+        fill(scene, view, middle, 0.0, LINES)
+        for number, centre in tag_places(self._table).items():
+            paste_tag(scene, view, number, centre)
+
+    def _draw(
+        self, part: Array, seen: Seen, later: float, corner: tuple[int, int]
+    ) -> None:
+        view, radius = self.view, self._table.puck_radius
+        paddle = seen.paddle + later * seen.paddle_velocity
+        moved = None if seen.puck is None else seen.puck + later * seen.puck_velocity
+        for puck in (self.left, moved):
+            if puck is not None:
+                shade(part, view, puck + SHADOW + radius * CIRCLE, corner)
+                fill(part, view, puck + radius * CIRCLE, PUCK_HEIGHT, PUCK, corner)
+        size = self._table.paddle_radius
+        shade(part, view, paddle + 4 * SHADOW + size * CIRCLE, corner)
+        fill(part, view, paddle + size * CIRCLE, PADDLE_TOP, PADDLE, corner)
+        corners = _link(paddle, self._base)
+        pixels = view.project(np.column_stack([corners, ARM_HEIGHTS]))
+        draw_polygon(part, pixels - corner, ARM)
+
+    def _outlines(self, seen: Seen) -> list[Array]:
+        table = self._table
+        link = _link(seen.paddle, self._base)
+        found = [
+            self.view.project(np.column_stack([link, ARM_HEIGHTS])),
+            self._disc(seen.paddle, table.paddle_radius),
+        ]
+        for puck in (self.left, seen.puck):
+            if puck is not None:
+                found.insert(0, self._disc(puck, table.paddle_radius))
+        return found
+
+    def _speed(self, seen: Seen) -> float:
+        both = seen.puck_velocity, seen.paddle_velocity
+        return max(float(np.linalg.norm(velocity)) for velocity in both)
+
+
+def _link(paddle: Array, base: Array) -> Array:
+    """Return the corners (4, 2) of the arm's last link, table frame, m.
+
+    Args:
+        paddle: (2,) position of the paddle, m.
+        base: (2,) position of the arm's base, m.
+    """
+    along = base - paddle
+    along = along / np.linalg.norm(along)
+    aside = np.array([-along[1], along[0]])
+    far = paddle + 0.45 * along
+    near = paddle - 0.02 * along
+    wide, narrow = 0.06 * aside, 0.035 * aside
+    return np.stack([near + narrow, near - narrow, far - wide, far + wide])

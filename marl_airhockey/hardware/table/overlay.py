@@ -1,0 +1,80 @@
+"""Overlay: a camera frame with the estimated bodies and marks drawn over it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from marl_airhockey.contracts.mark import Mark, Meaning
+from marl_airhockey.core.table import Table
+from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.types import Array
+
+CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 1)
+PUCK, PADDLE, RAIL = (255, 240, 0), (255, 140, 0), (90, 140, 255)
+"""Colours: red, green, blue"""
+MARKS: dict[Meaning, tuple[int, int, int]] = {
+    "goal": (0, 220, 120),
+    "reward": (255, 215, 60),
+    "cost": (255, 60, 60),
+    "drag": (170, 180, 200),
+}
+"""Colours of marks by what they mean"""
+AHEAD = 0.15
+"""Time for which the velocity line extends the puck's motion, s"""
+
+
+class Overlay:
+    """Overlay for one view of one table.
+
+    Args:
+        view: View of the camera.
+        table: Table in the view.
+    """
+
+    def __init__(self, view: CameraView, table: Table) -> None:
+        self._view, self._table = view, table
+
+    def draw(
+        self,
+        image: Array,
+        paddle: Array,
+        puck: Array | None,
+        marks: Sequence[Mark],
+        width: int,
+    ) -> Array:
+        """Return (H, W, 3) uint8 RGB, ``width`` pixels wide.
+
+        Args:
+            image: Frame (H, W, 3) uint8, blue, green, red.
+            paddle: (2,) position of the paddle, table frame, m.
+            puck: (4,) position, m, and velocity, m/s, of the puck; None without one.
+            marks: Marks of the scenario.
+            width: Width of the result, px.
+        """
+        drawn = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+        table = self._table
+        corners = np.asarray(table.vertices)
+        self._line(drawn, np.vstack([corners, corners[:1]]), RAIL)
+        for mark in marks:
+            colour = MARKS[mark.means]
+            if mark.kind == "circle":
+                self._line(drawn, np.array(mark.start) + mark.radius * CIRCLE, colour)
+            else:
+                self._line(drawn, np.array([mark.start, mark.end]), colour)
+        self._line(drawn, paddle + table.paddle_radius * CIRCLE, PADDLE)
+        if puck is not None:
+            self._line(drawn, puck[:2] + table.puck_radius * CIRCLE, PUCK)
+            self._line(drawn, np.stack([puck[:2], puck[:2] + AHEAD * puck[2:]]), PUCK)
+        height = round(width * image.shape[0] / image.shape[1])
+        if width != image.shape[1]:
+            drawn = cv2.resize(drawn, (width, height), interpolation=cv2.INTER_AREA)
+        return np.asarray(drawn)
+
+    def _line(self, image: Array, points: Array, colour: tuple[int, int, int]) -> None:
+        """Draw a line through points (n, 2) on the table."""
+        flat = np.column_stack([points, np.zeros(len(points))])
+        pixels = np.round(self._view.project(flat) * 16).astype(np.int32)
+        cv2.polylines(image, [pixels], False, colour, 2, cv2.LINE_AA, 4)
