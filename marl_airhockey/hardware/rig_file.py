@@ -64,7 +64,7 @@ def rig_fields(path: Path, given: Any, kind: str) -> dict[str, Any]:
     given = dict(given) if isinstance(given, dict) else given
     found = given.pop("format", None) if isinstance(given, dict) else None
     if found is None:
-        raise ValueError(f"{path}: no rig; {WRITERS[kind]} writes one")
+        raise ValueError(f"{path}: no rig, no format; {WRITERS[kind]} writes one")
     if found != FORMAT:
         raise ValueError(f"{path}: format {found!r}, expected {FORMAT}")
     other = given.pop("kind", "table")

@@ -1,8 +1,8 @@
 """Arm of a controller in this process, in emulated time.
 
-It is the client side of a controller as `hardware.robot.Ur5e` is, without ports, threads
-and clocks: minutes of driving take seconds, and the same calls give the same motion.
-Time passes in `advance`, and in the calls that wait for the controller.
+It is the client side of a controller as `hardware.robot.Ur5e` is, without ports,
+threads and clocks: minutes of driving take seconds, and the same calls give the same
+motion. Time passes in `advance`, and in the calls that wait for the controller.
 """
 
 from __future__ import annotations
