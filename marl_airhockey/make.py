@@ -11,21 +11,21 @@ if TYPE_CHECKING:
     from gymnasium.vector import AutoresetMode
     from pettingzoo.utils.env import AECEnv
 
-    from marl_airhockey.contracts.scenario import Scenario
     from marl_airhockey.envs.gymnasium_env import AirHockeySingleEnv
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
     from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
     from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv
-    from marl_airhockey.world.keywords import Keywords
-    from marl_airhockey.world.world import World
+    from marl_airhockey.sim.contracts.scenario import Scenario
+    from marl_airhockey.sim.world.keywords import Keywords
+    from marl_airhockey.sim.world.world import World
 
 
 def make_world(
     scenario: str | Scenario, num_worlds: int = 1, **keywords: Unpack[Keywords]
 ) -> World:
     """Build B worlds as arrays: ``reset(seed)``, ``step(actions (B, open, 2))``."""
-    from marl_airhockey.world.build import build_world
+    from marl_airhockey.build import build_world
 
     return build_world(scenario, num_worlds, autoreset=True, keywords=keywords)
 
@@ -89,7 +89,7 @@ def make_vec(
         **keywords: See `build.build_world`.
     """
     from marl_airhockey.envs.gymnasium_vec_env import AirHockeyVectorEnv
-    from marl_airhockey.world.keywords import check_keywords
+    from marl_airhockey.sim.world.keywords import check_keywords
 
     check_keywords(keywords)
     modes = autoreset_mode, render_mode
@@ -110,7 +110,7 @@ def make_sb3_vec(
         render_mode: None or "rgb_array": pictures of all worlds, tiled.
         **keywords: See `build.build_world`.
     """
-    from marl_airhockey.core.errors import require
+    from marl_airhockey.sim.core.errors import require
 
     require("stable_baselines3", "train")
     from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
@@ -126,7 +126,7 @@ def make_torchrl(
     **keywords: Unpack[Keywords],
 ) -> AirHockeyTorchEnv:
     """Build a TorchRL EnvBase of batch size (num_worlds,), a group for each team."""
-    from marl_airhockey.core.errors import require
+    from marl_airhockey.sim.core.errors import require
 
     require("torchrl", "ecosystem")
     from marl_airhockey.envs.torchrl_env import AirHockeyTorchEnv

@@ -11,15 +11,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
-from marl_airhockey.backends.find import simulated_backend, simulated_names
-from marl_airhockey.contracts.backend import Backend
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import GoalScenario, Scenario
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.discovery import names_in
 from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
 from marl_airhockey.policies.callables import driver_of
 from marl_airhockey.policies.load import ZOO, load_policy
+from marl_airhockey.sim.backends.find import simulated_backend, simulated_names
+from marl_airhockey.sim.contracts.backend import Backend
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.sim.core.errors import unknown_name
 
 DEFAULT_BACKEND = "numba"
 """Name of the backend that is used unless another is given"""

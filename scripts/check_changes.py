@@ -2,9 +2,10 @@
 
     make check
 
-The tests of ``marl_airhockey/sensing/delay.py`` are ``tests/sensing/test_delay.py``, or
-all of ``tests/sensing`` if there is no such file. A scenario or driver gets its part of
-``tests/suites``. This is for use while editing; ``make test`` is the whole short run.
+The tests of ``marl_airhockey/sim/sensing/delay.py`` are those of
+``tests/sim/sensing/test_delay.py``, or all of the folder if there is no such file. A
+scenario or driver gets its part of ``tests/suites``. This is for use while editing;
+``make test`` is the whole short run.
 """
 
 from __future__ import annotations
@@ -39,10 +40,10 @@ def tests_of(path: Path) -> Path | None:
         return tests / "docs"
     if inside[0] != "marl_airhockey" or path.suffix != ".py":
         return None
-    folder = tests / inside[1]
+    folder = tests.joinpath(*inside[1:-1])
     own = folder / f"test_{path.stem}.py"
-    found = [place for place in (own, folder) if place.exists()]
-    return found[0] if found else None
+    places = [own, *(f for f in (folder, *folder.parents) if tests in f.parents)]
+    return next((place for place in places if place.exists()), None)
 
 
 def run(*command: str | Path) -> bool:

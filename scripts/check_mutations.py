@@ -20,7 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.jit.folders import cache_folder
 
 ROOT = Path(__file__).parents[1]
 
@@ -41,59 +41,59 @@ class Fault(NamedTuple):
 FAULTS = [
     Fault(
         "friction pushes",
-        "marl_airhockey/core/laws.py",
+        "marl_airhockey/sim/core/laws.py",
         "min(max(-slip / tangential_mass",
         "min(max(slip / tangential_mass",
-        "core/test_laws.py suites/test_every_backend.py",
+        "sim/core/test_laws.py suites/test_every_backend.py",
     ),
     Fault(
         "restitution subtracted",
-        "marl_airhockey/core/laws.py",
+        "marl_airhockey/sim/core/laws.py",
         "normal = (1.0 + restitution)",
         "normal = (1.0 - restitution)",
-        "core/test_laws.py suites/test_every_backend.py",
+        "sim/core/test_laws.py suites/test_every_backend.py",
     ),
     Fault(
         "drag halved",
-        "marl_airhockey/core/laws.py",
+        "marl_airhockey/sim/core/laws.py",
         "z = drag * time *",
         "z = 0.5 * drag * time *",
-        "core/test_laws.py",
+        "sim/core/test_laws.py",
     ),
     Fault(
         "delay line off by one",
-        "marl_airhockey/sensing/delay.py",
+        "marl_airhockey/sim/sensing/delay.py",
         "return max(newer - 1, 0), max(newer, 0), 1.0 - (back - whole)",
         "return max(newer - 2, 0), max(newer - 1, 0), 1.0 - (back - whole)",
-        "sensing/test_delay.py sensing/test_sensor.py",
+        "sim/sensing/test_delay.py sim/sensing/test_sensor.py",
     ),
     Fault(
         "stale sensor frame",
-        "marl_airhockey/sensing/frame.py",
+        "marl_airhockey/sim/sensing/frame.py",
         "age = errors.observation_delay[w] + errors",
         "age = view.control_dt + errors.observation_delay[w] + errors",
-        "sensing/test_sensor.py",
+        "sim/sensing/test_sensor.py",
     ),
     Fault(
         "seed without i",
-        "marl_airhockey/core/rng.py",
+        "marl_airhockey/sim/core/rng.py",
         "return np.uint64(int(given)) + np.arange(worlds, dtype=np.uint64)",
         "return np.full(worlds, int(given), np.uint64)",
         "envs/test_bad_input.py",
     ),
     Fault(
         "swapped seat",
-        "marl_airhockey/world/driven_seat.py",
+        "marl_airhockey/sim/world/driven_seat.py",
         "seats, form = np.array([self.index]), self.driver.observe",
         "seats, form = np.array([0]), self.driver.observe",
-        "world/test_roster.py",
+        "sim/world/test_roster.py",
     ),
     Fault(
         "acceleration not limited",
-        "marl_airhockey/core/limits.py",
+        "marl_airhockey/sim/core/limits.py",
         "fit = most / max(change, most)",
         "fit = 1.0",
-        "core/test_limits.py",
+        "sim/core/test_limits.py",
     ),
     Fault(
         "reward term dropped",
@@ -111,14 +111,14 @@ FAULTS = [
     ),
     Fault(
         "success not latched",
-        "marl_airhockey/world/referee.py",
+        "marl_airhockey/sim/world/referee.py",
         '"success": episode["success"] | success',
         '"success": success',
-        "world suites/test_every_goal_scenario.py",
+        "sim/world suites/test_every_goal_scenario.py",
     ),
     Fault(
         "time limit reported as an end",
-        "marl_airhockey/world/referee.py",
+        "marl_airhockey/sim/world/referee.py",
         '"terminated": terminated,',
         '"terminated": terminated | over,',
         "suites/test_every_scenario.py envs",
@@ -188,10 +188,10 @@ FAULTS = [
     ),
     Fault(
         "true memory is sensed",
-        "marl_airhockey/world/sensed_memory.py",
+        "marl_airhockey/sim/world/sensed_memory.py",
         "for name in self._scenario.announced",
         "for name in new",
-        "sensing/test_sensed_contacts.py",
+        "sim/sensing/test_sensed_contacts.py",
     ),
     Fault(
         "robot resumes automatically",

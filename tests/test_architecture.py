@@ -14,7 +14,10 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
 LEAVES = [PACKAGE.parent / folder for folder in ("scenarios", "agents")]
 SOURCES = [path for folder in (PACKAGE, *LEAVES) for path in folder.rglob("*.py")]
-LOWER_PACKAGES = ("types", "jit", "core", "contracts", "sensing", "toolkit")
+LOWER_PACKAGES = (
+    *("types", "toolkit"),
+    *(f"sim/{name}" for name in ("jit", "core", "contracts", "sensing")),
+)
 EXTRAS = [
     "torch",
     "stable_baselines3",
@@ -33,12 +36,12 @@ EXTRAS = [
 ]
 MOST_LINES = 300
 LONG = {
-    "backends/numba/busy.py": "the broad phase, whose bounds share one derivation",
-    "backends/pymunk/space.py": "one space with the callbacks of its collisions",
+    "sim/backends/numba/busy.py": "the broad phase, whose bounds share one derivation",
+    "sim/backends/pymunk/space.py": "one space with the callbacks of its collisions",
     "hardware/table/backend.py": "the life of one table's devices, from start to stop",
-    "contracts/scenario.py": "a contract with the methods that all scenarios share",
+    "sim/contracts/scenario.py": "a contract with the methods that all scenarios share",
     "toolkit/observables.py": "twelve observables of some 25 lines each",
-    "world/world.py": "one class, which all environments are views of",
+    "sim/world/world.py": "one class, which all environments are views of",
 }
 """Reasons of the files that are longer"""
 PRIVATE_WORDS = {"told", "shut", "turn", "turns", "turned", "court", "ledger", "chain"}

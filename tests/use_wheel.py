@@ -8,7 +8,7 @@ import numpy as np
 
 import marl_airhockey as ah
 from marl_airhockey import registry
-from marl_airhockey.jit import folders, shipped
+from marl_airhockey.sim.jit import folders, shipped
 
 assert "site-packages" in ah.__file__, ah.__file__
 assert len(ah.scenario_names()) >= 10

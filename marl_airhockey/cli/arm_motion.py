@@ -8,10 +8,10 @@ from pathlib import Path
 
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.cli.real_table import rig_of
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.rig import Rig
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 

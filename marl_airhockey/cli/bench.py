@@ -15,7 +15,7 @@ from marl_airhockey.cli.options import (
     console,
 )
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.core.errors import require
+from marl_airhockey.sim.core.errors import require
 
 
 def bench_environments(

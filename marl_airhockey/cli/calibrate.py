@@ -13,10 +13,10 @@ import typer
 from marl_airhockey.cli import play as cli_play
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.camera import Camera, open_source
 from marl_airhockey.hardware.vision.calibration import tag_corners
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from rich.table import Table
 from marl_airhockey.cli.arm_motion import moving_arm, summarize
 from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.real_table import LabOption
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.servo import HALF
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.servo import HALF
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def _plot(trials: Sequence[ArmTrial], values: dict[str, Any], path: Path) -> Non
     require("matplotlib", "train")
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.render.charts import DPI, INK, save, tidy
+    from marl_airhockey.sim.render.charts import DPI, INK, save, tidy
 
     f = np.linspace(0.5, 5.0, 200)
     # A critically damped lag: both of its poles lie at this frequency.

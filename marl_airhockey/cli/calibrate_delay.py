@@ -14,7 +14,7 @@ from rich.table import Table
 from marl_airhockey.cli.arm_motion import moving_arm, summarize
 from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.real_table import LabOption
-from marl_airhockey.core.errors import require
+from marl_airhockey.sim.core.errors import require
 
 if TYPE_CHECKING:
     from marl_airhockey.hardware.calibration.delay import Delays
@@ -64,7 +64,7 @@ def _plot(found: Delays, path: Path) -> None:
     require("matplotlib", "train")
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.render.charts import DPI, INK, save, tidy
+    from marl_airhockey.sim.render.charts import DPI, INK, save, tidy
 
     figure, panels = plt.subplots(1, 3, figsize=(9, 2.8), dpi=DPI, layout="constrained")
     parts = (found.camera, found.arm, found.round_trip)

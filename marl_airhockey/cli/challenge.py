@@ -10,7 +10,6 @@ import typer
 from marl_airhockey import __version__
 from marl_airhockey.cli.options import AsJson, Trusting, console
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.challenge import (
     FIELD,
     PROFILES,
@@ -18,6 +17,7 @@ from marl_airhockey.evaluation.challenge import (
     play_challenge,
 )
 from marl_airhockey.evaluation.challenge_report import Result
+from marl_airhockey.sim.core.errors import require
 
 
 def challenge(

@@ -29,8 +29,8 @@ from marl_airhockey.cli.real_table import (
     name_on_table,
     real_table,
 )
-from marl_airhockey.core.errors import require
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.sim.core.errors import require
 
 data = typer.Typer(
     help="Recordings: make them, look into them, sum them up.", no_args_is_help=True
@@ -220,8 +220,8 @@ def report(
     require("matplotlib", "train")
     from marl_airhockey.play.plots import plot_report
     from marl_airhockey.play.report import summarize
-    from marl_airhockey.study.answers import read_answers
-    from marl_airhockey.study.tables import save
+    from marl_airhockey.play.study.answers import read_answers
+    from marl_airhockey.play.study.tables import save
 
     found, answers = summarize(folder, scenario), read_answers(folder)
     files = found.save(out or folder)

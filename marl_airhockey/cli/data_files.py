@@ -10,7 +10,7 @@ import typer
 
 from marl_airhockey.cli.data import show
 from marl_airhockey.cli.options import Options, console, settings
-from marl_airhockey.core.errors import require
+from marl_airhockey.sim.core.errors import require
 
 
 def repair(

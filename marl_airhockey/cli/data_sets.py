@@ -12,7 +12,7 @@ from rich.table import Table
 
 from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.core.errors import require
+from marl_airhockey.sim.core.errors import require
 
 
 def get(

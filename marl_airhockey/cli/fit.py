@@ -10,13 +10,13 @@ from rich.table import Table
 
 from marl_airhockey.cli.options import Physics, console, physics_of
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.profiles import PROFILES
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import make_agent
-from marl_airhockey.transfer.table_fit import FittedTable
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.profiles import PROFILES
+from marl_airhockey.sim.core.table import TABLES
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.system_id.table_fit import FittedTable
 
 FitFile = Annotated[Path, typer.Option(help="File to write.")]
 
@@ -44,8 +44,8 @@ def fit(
     if scenario.endswith(".csv"):
         raise ValueError(f"fit: rows of a table are for airhockey fit-table {scenario}")
     from marl_airhockey.data.files import recordings_in
-    from marl_airhockey.transfer.recorded_play import load_recordings, record_play
-    from marl_airhockey.transfer.system_id import fit_physics
+    from marl_airhockey.system_id.recorded_play import load_recordings, record_play
+    from marl_airhockey.system_id.system_id import fit_physics
 
     if recordings is not None:
         seen = load_recordings(recordings_in([recordings]))
@@ -101,9 +101,9 @@ def fit_table(
     out: FitFile = Path("fit.toml"),
 ) -> None:
     """Fit the physics of a real table to rows of play on it."""
-    from marl_airhockey.transfer.corrected_fit import fit_corrected
-    from marl_airhockey.transfer.profile_file import profile_toml, read_delays
-    from marl_airhockey.transfer.track import read_track
+    from marl_airhockey.system_id.corrected_fit import fit_corrected
+    from marl_airhockey.system_id.profile_file import profile_toml, read_delays
+    from marl_airhockey.system_id.track import read_track
 
     if table not in TABLES:
         raise ValueError(unknown_name("table", table, TABLES))

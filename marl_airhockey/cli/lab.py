@@ -12,11 +12,11 @@ from marl_airhockey.cli import play as cli_play
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import name_on_table, real_table
-from marl_airhockey.core.errors import require
 from marl_airhockey.hardware.lab.faults import FAULTS
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.registry import REAL, find_backend
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.world.keywords import Keywords
 
 GAME, PLAYER = "juggle", "zoo/juggle"
 """Scenario and player of the demo"""

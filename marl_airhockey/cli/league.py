@@ -21,10 +21,10 @@ from marl_airhockey.cli.options import (
     environment,
 )
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.core.errors import require
 from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, league
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.sim.core.errors import require
 
 SCRIPTS = (
     "random",

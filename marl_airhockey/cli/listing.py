@@ -12,10 +12,10 @@ from marl_airhockey.cli.options import (
     AsJson,
     console,
 )
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.profiles import PROFILES, SUFFIX
 from marl_airhockey.envs.describe import describe, describe_profile, summary
 from marl_airhockey.registry import plugin_names, runs_code, scenario_names
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.profiles import PROFILES, SUFFIX
 
 
 def list_scenarios(

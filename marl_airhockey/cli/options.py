@@ -10,16 +10,16 @@ import typer
 from rich.console import Console
 
 from marl_airhockey.cli.progress import bar, errors
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.physics import load_physics
-from marl_airhockey.jit.threads import use_threads
 from marl_airhockey.policies.trust import Trust
 from marl_airhockey.rollout.as_trained import (
     as_trained,
     describe_environment,
     seen_in,
 )
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.core.physics import load_physics
+from marl_airhockey.sim.jit.threads import use_threads
+from marl_airhockey.sim.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig

@@ -24,10 +24,10 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
-from marl_airhockey.core.errors import require
 from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
 from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_agent
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette

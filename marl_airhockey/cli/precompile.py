@@ -13,11 +13,9 @@ from typing import Annotated
 
 import typer
 
+from marl_airhockey.build import compile_world
 from marl_airhockey.cli.options import Backend
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.jit import shipped
-from marl_airhockey.jit.cache import used
 from marl_airhockey.registry import (
     DEFAULT_BACKEND,
     agent_class,
@@ -28,8 +26,10 @@ from marl_airhockey.registry import (
     zoo_names,
 )
 from marl_airhockey.rollout.as_trained import as_trained
-from marl_airhockey.world.build import compile_world
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.jit import shipped
+from marl_airhockey.sim.jit.cache import used
+from marl_airhockey.sim.world.keywords import Keywords
 
 
 def precompile(

@@ -18,7 +18,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from marl_airhockey.jit.notices import repeated
+from marl_airhockey.sim.jit.notices import repeated
 
 errors = Console(stderr=True)
 """Console of messages that are no results, so that output can be piped"""

@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
+from marl_airhockey.build import table_keywords
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.registry import REAL, zoo_names
-from marl_airhockey.world.build import table_keywords
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.world.keywords import Keywords
 
 SUFFIX = "_full_size"
 """Ending of the names of policies of the zoo that were trained for the real table"""

@@ -11,7 +11,7 @@ from rich.table import Table
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.play import Browser, Host, Port, host_table
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.core.errors import require
+from marl_airhockey.sim.core.errors import require
 
 study = typer.Typer(
     help="Studies: participants play opponents in a planned order.",
@@ -24,7 +24,7 @@ Folder = Annotated[Path, typer.Option("--out", help="What is recorded goes here.
 @study.command()
 def new(file: File) -> None:
     """Write an example of a plan, to be changed."""
-    from marl_airhockey.study.plan import EXAMPLE
+    from marl_airhockey.play.study.plan import EXAMPLE
 
     try:
         with file.open("x") as target:
@@ -43,8 +43,8 @@ def orders(
 ) -> None:
     """Print the order in which participants play the opponents of a plan."""
     require("starlette", "play")
-    from marl_airhockey.study.opponents import open_match
-    from marl_airhockey.study.plan_file import load_plan
+    from marl_airhockey.play.study.opponents import open_match
+    from marl_airhockey.play.study.plan_file import load_plan
 
     plan = load_plan(file)
     open_match(plan).close()
@@ -69,9 +69,9 @@ def run(
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.server import application
-    from marl_airhockey.study.archive import claim_folder
-    from marl_airhockey.study.plan_file import load_plan
-    from marl_airhockey.study.study import open_study
+    from marl_airhockey.play.study.archive import claim_folder
+    from marl_airhockey.play.study.plan_file import load_plan
+    from marl_airhockey.play.study.study import open_study
 
     plan = load_plan(file)
     claim_folder(out, file)
@@ -89,7 +89,7 @@ def list_participants(
     folder: Annotated[Path, typer.Argument(help="Of the study.")],
 ) -> None:
     """List participants: number, code, games, answered blocks, how they ended."""
-    from marl_airhockey.study.archive import diaries
+    from marl_airhockey.play.study.archive import diaries
 
     table = Table("number", "code", "began", "games", "blocks answered", "state")
     for diary in diaries(folder):
@@ -116,7 +116,7 @@ def erase(
     code: Annotated[str, typer.Argument(help="That the participant was shown.")],
 ) -> None:
     """Erase all that is kept of a participant."""
-    from marl_airhockey.study.archive import erase as delete
+    from marl_airhockey.play.study.archive import erase as delete
 
     console.print(f"erased {delete(folder, code)} files of {code}")
     console.print("reports elsewhere may still name them: make them again")

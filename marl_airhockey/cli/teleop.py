@@ -18,8 +18,8 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
-from marl_airhockey.core.errors import require
 from marl_airhockey.registry import REAL
+from marl_airhockey.sim.core.errors import require
 
 
 def teleop(

@@ -24,8 +24,8 @@ from marl_airhockey.cli.options import (
     train_with_progress,
 )
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.core.errors import require
 from marl_airhockey.registry import DEFAULT_BACKEND
+from marl_airhockey.sim.core.errors import require
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig

@@ -19,11 +19,11 @@ from marl_airhockey.cli.options import (
     train_with_progress,
 )
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.profiles import find_profile
 from marl_airhockey.policies.trust import require_trust
 from marl_airhockey.registry import find_backend, find_scenario, make_agent
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.profiles import find_profile
 
 if TYPE_CHECKING:
     from marl_airhockey.evaluation.evaluate import EvaluationResult
@@ -60,7 +60,7 @@ def transfer(
     as_json: AsJson = False,
 ) -> None:
     """Measure policies from the 2D table elsewhere: success with 95 % intervals."""
-    from marl_airhockey.transfer.measure import measure_transfer, plot_transfer
+    from marl_airhockey.system_id.measure import measure_transfer, plot_transfer
 
     folder = out or Path("runs") / f"transfer-{scenario}"
     # Everything that may be wrong is checked before anything takes time.
@@ -110,7 +110,7 @@ def _policies(
         seed: of training.
         folder: of the runs.
     """
-    from marl_airhockey.transfer.measure import fine_tuning_config, pretraining_config
+    from marl_airhockey.system_id.measure import fine_tuning_config, pretraining_config
 
     for name in names:
         make_agent(name)

@@ -30,10 +30,10 @@ from marl_airhockey.cli.real_table import (
     name_on_table,
     real_table,
 )
-from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.evaluation.comparison import Comparison, Estimates
@@ -157,13 +157,13 @@ def _play(
     out: Path,
 ) -> TrialSheet:
     """Play the trials of a plan from starts that are spread; return the sheet."""
+    from marl_airhockey.build import build_driven_world
     from marl_airhockey.evaluation.trial_sheet import TrialSheet
     from marl_airhockey.evaluation.trials import (
         play_trials,
         spread_starts,
         write_starts,
     )
-    from marl_airhockey.world.build import build_driven_world
 
     every = [driver for policies in drivers.values() for driver in policies]
     forms = [driver.observe for driver in every if driver.observe]

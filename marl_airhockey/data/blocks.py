@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.core.recording import EPISODES, Columns
 from marl_airhockey.data.parquet import table_of, write_table
 from marl_airhockey.data.parts import part_path
+from marl_airhockey.sim.core.recording import EPISODES, Columns
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,11 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from marl_airhockey.core.recording import Episode
 from marl_airhockey.data.files import shared_head
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.registry import make_scenario
-from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.core.recording import Episode
+from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.types import Array
 
 DRAWN = (

@@ -11,8 +11,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from marl_airhockey.core.recording import FILM
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import episodes_without_film
 from marl_airhockey.data.reader import read_recording
@@ -22,6 +20,8 @@ from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.rig_file import rig_fields
 from marl_airhockey.hardware.vision import Detector
 from marl_airhockey.hardware.vision.calibration import view_trouble
+from marl_airhockey.sim.core.recording import FILM
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 LOOKED = 5

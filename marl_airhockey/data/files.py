@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.recording import META
 from marl_airhockey.data.reader import missing_steps, read_head
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.core.recording import META
+from marl_airhockey.sim.jit.folders import cache_folder
 
 NAME = re.compile(r"^\w[-.\w]*(/\w[-.\w]*)*$")
 """Form of the name of an exported dataset"""

@@ -8,8 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from marl_airhockey.core.recording import FILM, Columns, Episode
 from marl_airhockey.hardware.camera import Film
+from marl_airhockey.sim.core.recording import FILM, Columns, Episode
 from marl_airhockey.types import Array
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import Column, Columns
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.recording import Column, Columns
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:

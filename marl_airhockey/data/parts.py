@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from marl_airhockey.core.recording import STEPS
 from marl_airhockey.data.parquet import SETTINGS, read_table
+from marl_airhockey.sim.core.recording import STEPS
 
 ROWS = 65_536
 """Number of steps from which on a group of rows is written"""

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.data.extract import Trajectories
-from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.core.table import TABLES
+from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.types import Array
 
 

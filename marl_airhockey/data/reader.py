@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.recording import (
+from marl_airhockey.data.parquet import KEYS, columns_of, read_table
+from marl_airhockey.data.parts import parts_of
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.recording import (
     EPISODES,
     FINITE,
     FORMAT,
@@ -23,8 +25,6 @@ from marl_airhockey.core.recording import (
     Episode,
     Recording,
 )
-from marl_airhockey.data.parquet import KEYS, columns_of, read_table
-from marl_airhockey.data.parts import parts_of
 from marl_airhockey.types import Array
 
 LARGEST_META = 1 << 24

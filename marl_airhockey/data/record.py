@@ -6,9 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.recording import FILM, PLAYED, Columns
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.data.derived import resume
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import film_columns
@@ -23,9 +21,11 @@ from marl_airhockey.rollout.columns import (
 )
 from marl_airhockey.rollout.play import play
 from marl_airhockey.rollout.rollout import AT_ONCE, play_episodes
-from marl_airhockey.world.build import build_driven_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.recording import FILM, PLAYED, Columns
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 
 
 def record_episodes(

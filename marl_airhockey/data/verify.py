@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.recording import Columns, Recording
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.sim.core.recording import Columns, Recording
 from marl_airhockey.types import Array
 
 MEASURED = ("clock", "round_trip", "pointer")

@@ -14,8 +14,12 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import (
+from marl_airhockey.data.blocks import Block, DiskWriter
+from marl_airhockey.data.files import parent_of
+from marl_airhockey.data.parquet import EXTRA, warm_up
+from marl_airhockey.data.parts import merge_parts, parts_of
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.recording import (
     FORMAT,
     META,
     PHYSICS,
@@ -24,10 +28,6 @@ from marl_airhockey.core.recording import (
     Columns,
     Episode,
 )
-from marl_airhockey.data.blocks import Block, DiskWriter
-from marl_airhockey.data.files import parent_of
-from marl_airhockey.data.parquet import EXTRA, warm_up
-from marl_airhockey.data.parts import merge_parts, parts_of
 
 FLUSH = 0.5
 """Longest time for which steps wait until they are on the disk, s"""

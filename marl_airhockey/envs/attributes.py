@@ -6,8 +6,8 @@ from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any
 
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 
 LIKE = 0.8
 """Likeness from which a name counts as misspelt"""

@@ -10,11 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario, Transition
-from marl_airhockey.contracts.units import range_of
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.profiles import PROFILES, delay_of, find_profile
-from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.build import build_world
 from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
 from marl_airhockey.registry import (
@@ -26,7 +22,11 @@ from marl_airhockey.registry import (
     scenario_names,
     zoo_names,
 )
-from marl_airhockey.world.build import build_world
+from marl_airhockey.sim.contracts.scenario import Scenario, Transition
+from marl_airhockey.sim.contracts.units import range_of
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.profiles import PROFILES, delay_of, find_profile
+from marl_airhockey.sim.core.rng import RandomStreams
 
 
 def what(scenario: Scenario) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gymnasium.envs.registration import EnvSpec
 
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.world.world import World
 
 
 class EpisodeLength:

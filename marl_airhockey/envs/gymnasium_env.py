@@ -7,14 +7,14 @@ from typing import Any, Unpack
 import gymnasium
 import numpy as np
 
-from marl_airhockey.contracts.scenario import GoalScenario, Scenario
-from marl_airhockey.core.state import State
 from marl_airhockey.envs.attributes import CheckedAttributes
 from marl_airhockey.envs.episode_length import SpecifiedLength
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.seats import check_one_open
+from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.keywords import Keywords
 
 
 class AirHockeySingleEnv(CheckedAttributes, SpecifiedLength, gymnasium.Env[Any, Array]):

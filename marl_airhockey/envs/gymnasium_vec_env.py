@@ -10,9 +10,7 @@ from gymnasium.utils.seeding import np_random
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.checks import check_count
-from marl_airhockey.core.state import State
+from marl_airhockey.build import build_world
 from marl_airhockey.envs.attributes import CheckedAttributes
 from marl_airhockey.envs.episode_length import SpecifiedLength
 from marl_airhockey.envs.infos import infos_of
@@ -25,12 +23,14 @@ from marl_airhockey.envs.reset_options import (
     reset_world,
 )
 from marl_airhockey.envs.seats import check_one_open
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.checks import check_count
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.spaces import action_space, observation_space
+from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.build import build_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.observer import Observation
-from marl_airhockey.world.spaces import action_space, observation_space
-from marl_airhockey.world.step_result import StepResult
 
 
 class AirHockeyVectorEnv(

@@ -8,10 +8,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from marl_airhockey.core.limits import VIOLATIONS
+from marl_airhockey.sim.core.limits import VIOLATIONS
+from marl_airhockey.sim.world.step_result import StepResult
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.step_result import StepResult
-from marl_airhockey.world.world import World
 
 CONSTRAINTS = tuple(f"constraint/{name}" for name in VIOLATIONS[:-1])
 """Keys of the excess of an action over each limit, in the order of `VIOLATIONS`."""

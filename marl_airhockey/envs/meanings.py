@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterator
 from itertools import pairwise
 
-from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.sim.contracts.scenario import Scenario
 
 TERM = re.compile(r"^ *(\w+): (.+?)(?=\n *\w+: |\n\n|\Z)", re.MULTILINE | re.DOTALL)
 """Line of a docstring, ``name: meaning``, and those that it goes on in."""

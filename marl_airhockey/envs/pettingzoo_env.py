@@ -9,19 +9,19 @@ from typing import Any, Unpack
 import numpy as np
 from pettingzoo import ParallelEnv
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.state import State
+from marl_airhockey.build import build_world
 from marl_airhockey.envs.attributes import CheckedAttributes
 from marl_airhockey.envs.episode_length import EpisodeLength
 from marl_airhockey.envs.infos import info_of
 from marl_airhockey.envs.reset_options import reset_world
 from marl_airhockey.envs.seats import check_some_open
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.spaces import action_space, observation_space
+from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.build import build_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.spaces import action_space, observation_space
-from marl_airhockey.world.step_result import StepResult
 
 Dicts = tuple[
     dict[str, Any],
@@ -75,7 +75,7 @@ class AirHockeyEnv(CheckedAttributes, EpisodeLength, ParallelEnv[str, Any, Any])
         self.render_mode = render_mode
         self._renderer = None
         if render_mode is not None:
-            from marl_airhockey.render.renderer import Renderer
+            from marl_airhockey.sim.render.renderer import Renderer
 
             title = game.name.replace("_", " ")
             self._renderer = Renderer(

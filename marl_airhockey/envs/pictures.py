@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.world import World
 
 if TYPE_CHECKING:
-    from marl_airhockey.render.renderer import Renderer
+    from marl_airhockey.sim.render.renderer import Renderer
 
 
 class Pictures:
@@ -31,7 +31,7 @@ class Pictures:
         if render_mode != "rgb_array":
             what = "render_mode of a batch"
             raise ValueError(unknown_name(what, render_mode, (None, "rgb_array")))
-        from marl_airhockey.render.renderer import Renderer
+        from marl_airhockey.sim.render.renderer import Renderer
 
         title = world.scenario.name.replace("_", " ")
         mode, rows = render_mode, range(world.num_worlds)

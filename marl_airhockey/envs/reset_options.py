@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.world.observer import Observation
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.world import World
 
 OPTIONS = ("state", "memory")
 MASK = "reset_mask"

@@ -10,12 +10,12 @@ import numpy as np
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 
-from marl_airhockey.contracts.scenario import GoalScenario
-from marl_airhockey.core.state import State
 from marl_airhockey.envs.pettingzoo_env import AirHockeyEnv
 from marl_airhockey.envs.pictures import Pictures
 from marl_airhockey.envs.slot import Slot
 from marl_airhockey.envs.slots import SlotEnv
+from marl_airhockey.sim.contracts.scenario import GoalScenario
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.world.world import World
 
 
 def check_some_open(world: World) -> None:

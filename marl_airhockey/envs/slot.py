@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from marl_airhockey.core.state import State
 from marl_airhockey.envs.attributes import CheckedAttributes
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
 
 if TYPE_CHECKING:

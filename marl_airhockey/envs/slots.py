@@ -8,16 +8,16 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.state import State
+from marl_airhockey.build import build_world
 from marl_airhockey.envs.reset_options import reset_each
 from marl_airhockey.envs.seats import check_some_open
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.spaces import action_space, observation_space
+from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.build import build_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.observer import Observation
-from marl_airhockey.world.spaces import action_space, observation_space
-from marl_airhockey.world.step_result import StepResult
 
 
 class SlotEnv:

@@ -11,12 +11,12 @@ from tensordict import TensorDict, TensorDictBase
 from torchrl.data import Bounded, Categorical, Composite, Unbounded
 from torchrl.envs import EnvBase
 
-from marl_airhockey.contracts.scenario import Scenario
+from marl_airhockey.build import build_world
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.observer import Observation
+from marl_airhockey.sim.world.spaces import observation_space
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.observer import Observation
-from marl_airhockey.world.spaces import observation_space
 
 
 class AirHockeyTorchEnv(EnvBase):  # type: ignore[misc]

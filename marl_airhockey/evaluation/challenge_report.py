@@ -159,7 +159,7 @@ def plot_card(card: ChallengeReport, path: Path) -> None:
     """Draw the success in each task, a line for each profile, as a radar plot."""
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.render.charts import DPI, INK, INKS, save
+    from marl_airhockey.sim.render.charts import DPI, INK, INKS, save
 
     tasks = list(dict.fromkeys(r.scenario for r in card.results if not r.rival))
     angles = np.linspace(0.0, 2.0 * np.pi, len(tasks), endpoint=False)

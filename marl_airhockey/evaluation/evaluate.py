@@ -10,9 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.checks import check_count, check_seed
+from marl_airhockey.build import build_driven_world, scenario_of, table_keywords
 from marl_airhockey.data.files import whole_recordings_in
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.evaluation.comparison import Outcomes
@@ -23,9 +21,11 @@ from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.columns import head_of
 from marl_airhockey.rollout.rollout import play_episodes
-from marl_airhockey.world.build import build_driven_world, scenario_of, table_keywords
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.checks import check_count, check_seed
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 
 TEST_SEED = 2_000_000
 """First of the seeds that training never sees"""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.build import build_world, scenario_of
 from marl_airhockey.rollout.play import play
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.roster import Roster
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_world, scenario_of
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.roster import Roster
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ from typing import Unpack
 
 import numpy as np
 
+from marl_airhockey.build import scenario_of
 from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.policies.runs import policies_of
 from marl_airhockey.rollout.as_trained import seated_players
+from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import scenario_of
-from marl_airhockey.world.keywords import Keywords
 
 LEAGUE_SEED = 3_000_000
 """Seed of a league's first game"""

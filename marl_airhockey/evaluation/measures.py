@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.core.recording import PLAYED, Episode
+from marl_airhockey.sim.core.recording import PLAYED, Episode
 from marl_airhockey.types import Array
 
 COLUMNS = (

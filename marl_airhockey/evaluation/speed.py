@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.jit.threads import threads
 from marl_airhockey.make import make_world, parallel_env
+from marl_airhockey.sim.jit.threads import threads
 
 NUM_ACTIONS = 64
 """Number of different actions, drawn beforehand"""
@@ -150,7 +150,7 @@ def plot_speed(rates: Sequence[StepRate], path: Path) -> None:
     """Draw env-steps per CPU-second against the number of worlds, a line per case."""
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.render.charts import DPI, save, tidy
+    from marl_airhockey.sim.render.charts import DPI, save, tidy
 
     figure, axes = plt.subplots(figsize=(7.2, 4.4), dpi=DPI, layout="constrained")
     names = {(r.case.scenario, r.case.backend) for r in rates}

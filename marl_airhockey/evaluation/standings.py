@@ -160,7 +160,7 @@ def plot_scores(standings: Standings, path: Path) -> None:
     """Draw the matrix of scores, the best player first."""
     import matplotlib.pyplot as plt
 
-    from marl_airhockey.render.charts import DPI, save
+    from marl_airhockey.sim.render.charts import DPI, save
 
     order, count = standings.order, len(standings.names)
     score = standings.score[np.ix_(order, order)]

@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.state import State
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.measures import COLUMNS, measure
 from marl_airhockey.evaluation.trial_sheet import TrialRow, TrialSheet
 from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.world.driven_seat import DrivenSeat
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array, Memory
-from marl_airhockey.world.driven_seat import DrivenSeat
-from marl_airhockey.world.world import World
 
 DRAWS = 20
 """Starts that are drawn for each one that is taken"""

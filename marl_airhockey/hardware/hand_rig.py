@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.checks import build, check_fields
 from marl_airhockey.hardware.rig_file import check_tags, load_rig, save_rig
 from marl_airhockey.hardware.vision.colour import Colour
 from marl_airhockey.hardware.vision.detector import Detector
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.core.checks import build, check_fields
 from marl_airhockey.types import Array
 
 KIND = "hand"

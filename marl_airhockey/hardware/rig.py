@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.checks import build, check_fields
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.camera import LATENCY
 from marl_airhockey.hardware.rig_file import check_tags, load_rig, save_rig
 from marl_airhockey.hardware.robot.config import (
@@ -26,6 +23,9 @@ from marl_airhockey.hardware.robot.mounting import Mounting
 from marl_airhockey.hardware.robot.shaper import MotionLimits
 from marl_airhockey.hardware.vision.colour import Colour
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.core.checks import build, check_fields
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 LAB = re.compile(r"lab:\d+")

@@ -7,13 +7,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.learn.hindsight.config import ALGO as SAC_HER
 from marl_airhockey.learn.hindsight.config import HindsightConfig, hindsight_config
 from marl_airhockey.learn.offline.config import ALGORITHMS as OFFLINE
 from marl_airhockey.learn.offline.config import OfflineConfig, offline_config
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.settings import load_config, read_settings
+from marl_airhockey.sim.core.errors import unknown_name
 
 AnyConfig = PPOConfig | OfflineConfig | HindsightConfig
 """Configuration of a run of any algorithm"""

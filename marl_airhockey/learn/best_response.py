@@ -11,7 +11,7 @@ from marl_airhockey.learn.settings import load_config
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.world.keywords import Keywords
 
 GAMES = 400
 """Games by which a response is measured"""

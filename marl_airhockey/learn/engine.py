@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from marl_airhockey.build import compile_world
 from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
 from marl_airhockey.learn.logs import Log
@@ -21,7 +22,6 @@ from marl_airhockey.learn.self_play import SelfPlayEnv
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import find_backend
-from marl_airhockey.world.build import compile_world
 
 
 class AdaptiveRate:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.registry import make_agent
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.world.keywords import Keywords
 
 EVAL_SEED = 1_000_000
 """First seed of the evaluations during training"""

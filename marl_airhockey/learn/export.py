@@ -10,7 +10,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.data.files import dataset_of, recordings_in
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.games import play_against
@@ -28,6 +27,7 @@ from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.registry import find_scenario, make_agent
+from marl_airhockey.sim.core.errors import require
 
 EPISODES = 1000
 """Episodes by which a task's policy is measured"""

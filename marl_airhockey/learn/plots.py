@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from marl_airhockey.evaluation.stats import bootstrap, iqm
-from marl_airhockey.render.charts import DPI, INK, INKS, PALE, save, tidy
+from marl_airhockey.sim.render.charts import DPI, INK, INKS, PALE, save, tidy
 from marl_airhockey.types import Array
 
 

@@ -9,10 +9,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, ClassVar
 
-from marl_airhockey.core.profiles import SUFFIX, find_profile
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.learn.settings import check_names
 from marl_airhockey.registry import find_scenario
+from marl_airhockey.sim.core.profiles import SUFFIX, find_profile
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from marl_airhockey.policies.policy import trained_in
 from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.registry import DEFAULT_BACKEND
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.world.keywords import Keywords
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,9 +13,9 @@ from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.world.roster import Roster
+from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array
-from marl_airhockey.world.roster import Roster
-from marl_airhockey.world.step_result import StepResult
 
 SCORE_WEIGHT = 0.05
 """Weight of the latest game in the running score against an opponent"""

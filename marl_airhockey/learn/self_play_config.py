@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.registry import find_scenario
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.world.keywords import Keywords
 
 OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
 RIVALS = ("random", "goalkeeper", "striker", "allround")

@@ -8,11 +8,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.policies.runs import check_run_format
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import runs_code
+from marl_airhockey.sim.core.errors import unknown_name
 
 C = TypeVar("C", bound=RunConfig)
 

@@ -20,8 +20,6 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.errors import require, unknown_name
 from marl_airhockey.learn.algorithms import (
     PPO,
     AnyConfig,
@@ -36,6 +34,8 @@ from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.trust import trust_code
 from marl_airhockey.registry import find_scenario, make_agent
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.core.errors import require, unknown_name
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.recording import META, PLAYED, Episode, Recording
-from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.reader import read_head, read_recording
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.measures import Player, measure
 from marl_airhockey.rollout.columns import scenario_of
+from marl_airhockey.sim.core.recording import META, PLAYED, Episode, Recording
+from marl_airhockey.sim.core.scene import Scene
 
 FOREIGN = (
     *(ValueError, TypeError, KeyError, IndexError, AttributeError),

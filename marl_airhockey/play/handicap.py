@@ -9,9 +9,9 @@ from typing import Self
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.seat import Seat
+from marl_airhockey.sim.contracts.driver import Driver, View
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.types import Array
 
 BOUNDS = {"reaction": (0.0, 0.3), "noise": (0.0, 1.0), "pace": (0.05, 1.0)}

@@ -7,17 +7,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from marl_airhockey.contracts.observable import OBSERVE
-from marl_airhockey.core.recording import Columns
-from marl_airhockey.core.seat import Seat
+from marl_airhockey.build import build_world
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.rollout.columns import first_columns
-from marl_airhockey.world.build import build_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.step_result import StepResult
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.contracts.observable import OBSERVE
+from marl_airhockey.sim.core.recording import Columns
+from marl_airhockey.sim.core.seat import Seat
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.step_result import StepResult
+from marl_airhockey.sim.world.world import World
 
 RATE = 60
 """Ticks, and control steps, per second."""

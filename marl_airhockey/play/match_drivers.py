@@ -8,8 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.build import refuse_erratic
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.policies.load import ZOO, policy_file
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
@@ -19,11 +18,12 @@ from marl_airhockey.registry import (
     program_names,
     zoo_names,
 )
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import GoalScenario
+from marl_airhockey.sim.world.driven_seat import DrivenSeat
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.toolkit.pointing import ARM_LAG
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import refuse_erratic
-from marl_airhockey.world.driven_seat import DrivenSeat
-from marl_airhockey.world.world import World
 
 PERSON = "person"
 """Name of the driver of a seat that people take."""

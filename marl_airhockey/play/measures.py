@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from marl_airhockey.core.limits import VIOLATIONS
-from marl_airhockey.core.recording import Episode
-from marl_airhockey.core.scene import Scene
+from marl_airhockey.sim.core.limits import VIOLATIONS
+from marl_airhockey.sim.core.recording import Episode
+from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.types import Array
 
 INCOMING = 0.1

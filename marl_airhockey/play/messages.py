@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
 from marl_airhockey.envs.describe import what
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.toolkit.pointing import BRAKE, GAIN
 from marl_airhockey.types import Array, Memory
 

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from marl_airhockey.play.measures import Player
 from marl_airhockey.play.report import Report
-from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 
 LINE = 0.34
 """Height of a player's line, inches"""

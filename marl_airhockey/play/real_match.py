@@ -14,8 +14,8 @@ from marl_airhockey.hardware.table.backend import RealBackend
 from marl_airhockey.hardware.table.operator import Operator, make_operator
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.live_match import COUNTDOWN, LiveMatch
+from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
-from marl_airhockey.world.keywords import Keywords
 
 WIDTH, QUALITY = 640, 80
 """Width of the camera's pictures as pages get them, px, and their JPEG quality"""

@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import FILM, Columns
 from marl_airhockey.data.files import new_recording
 from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.parquet import EXTRA, warm_up
@@ -25,6 +23,8 @@ from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.hardware.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.rollout.columns import episode_notes, head_of, step_columns
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.recording import FILM, Columns
 
 
 class Recorder:

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.recording import Episode, Recording
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.messages import description, drawn, events
 from marl_airhockey.rollout.columns import memories_of, scenario_of, states_of
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.recording import Episode, Recording
 
 
 def one_episode(path: Path, number: int = 0) -> Recording:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import Columns
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.live_match import LiveMatch
 from marl_airhockey.play.match_drivers import PERSON
 from marl_airhockey.play.real_match import RealMatch
+from marl_airhockey.sim.core.recording import Columns
 
 IDLE = 60.0
 """Time without a movement after which a person counts as idle, s."""

@@ -7,7 +7,6 @@ import json
 import time
 from typing import Any
 
-from marl_airhockey.core.recording import PLAYED
 from marl_airhockey.play.client import Client
 from marl_airhockey.play.handicap import PRESETS
 from marl_airhockey.play.host import Host
@@ -15,6 +14,7 @@ from marl_airhockey.play.live_match import RATE
 from marl_airhockey.play.protocol import parse
 from marl_airhockey.play.real_match import RealMatch
 from marl_airhockey.play.recorder import Recorder
+from marl_airhockey.sim.core.recording import PLAYED
 
 BEHIND = 6
 """Ticks that the loop makes up for when it is late; more are skipped."""

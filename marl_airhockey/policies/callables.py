@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.sb3 import model_environment
+from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.types import Array
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.policies.policy import Policy, trained_in
+from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 ONNX_CARD = "card"

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.types import Array
 
 Predict = Callable[[Any, bool], Array]

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
 from marl_airhockey.policies.runs import check_run_format
 from marl_airhockey.policies.torch_weights import policy_of_weights
 from marl_airhockey.policies.trust import require_trust
+from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 

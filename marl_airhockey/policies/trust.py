@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from typing import ClassVar
 
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.jit.folders import cache_folder
 
 TRUSTED_CODE = "trusted-code.txt"
 """File in the cache folder with the SHA-256 of each Python file trained with."""

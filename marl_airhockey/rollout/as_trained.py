@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import Scenario
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import find_scenario, make_agent, runs_code
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.world.keywords import Keywords
 
 EVERYWHERE = ("profile", "control_dt", "goals")
 """Keywords that hold for a policy in any scenario"""

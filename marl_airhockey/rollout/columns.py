@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.physics import load_physics
-from marl_airhockey.core.recording import Columns, Episode, Recording
-from marl_airhockey.core.state import RESULTS, State
 from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.physics import load_physics
+from marl_airhockey.sim.core.recording import Columns, Episode, Recording
+from marl_airhockey.sim.core.state import RESULTS, State
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Memory
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
 
 STATE, SENSED, MEMORY, TERM = "state.", "sensed.", "memory.", "term."
 JUDGED = "judged."

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from marl_airhockey.sim.world.step_result import StepResult
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.step_result import StepResult
-from marl_airhockey.world.world import World
 
 
 class Played(NamedTuple):

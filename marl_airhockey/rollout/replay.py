@@ -14,14 +14,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from marl_airhockey.contracts.backend import Backend, Command
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.recording import Episode, Recording
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import RESULTS, State
-from marl_airhockey.jit.pipeline import Stage
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
 from marl_airhockey.rollout.collector import Collector
 from marl_airhockey.rollout.columns import (
@@ -31,9 +23,17 @@ from marl_airhockey.rollout.columns import (
     scenario_of,
     states_of,
 )
+from marl_airhockey.sim.contracts.backend import Backend, Command
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.recording import Episode, Recording
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import RESULTS, State
+from marl_airhockey.sim.jit.pipeline import Stage
+from marl_airhockey.sim.world.step_result import StepResult
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.step_result import StepResult
-from marl_airhockey.world.world import World
 
 
 class ReplayBackend(Backend):

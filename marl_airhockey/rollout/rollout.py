@@ -7,18 +7,18 @@ from typing import Unpack
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.checks import check_count, check_seed
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.recording import PLAYED, Episode
+from marl_airhockey.build import build_driven_world, table_keywords
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.collector import Collector
 from marl_airhockey.rollout.columns import step_columns
 from marl_airhockey.rollout.play import play
-from marl_airhockey.world.build import build_driven_world, table_keywords
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.checks import check_count, check_seed
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.recording import PLAYED, Episode
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 
 AT_ONCE = 64
 """Number of episodes that are played in one batch"""

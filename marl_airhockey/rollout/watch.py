@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.render.renderer import TOP, Renderer
-from marl_airhockey.render.video import check_ending, width_of, write_video
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.rollout.play import play
 from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.render.renderer import TOP, Renderer
+from marl_airhockey.sim.render.video import check_ending, width_of, write_video
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_driven_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
 
 FINAL_HOLD = 0.7
 """Time, s, for which a video rests on the last image of an episode"""

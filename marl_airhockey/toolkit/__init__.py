@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.contracts.observable import Observable
-from marl_airhockey.contracts.scenario import GoalScenario, Scenario, Transition
-from marl_airhockey.contracts.units import (
+from marl_airhockey.sim.contracts.driver import Driver, PrescribedMotion, View
+from marl_airhockey.sim.contracts.mark import Mark
+from marl_airhockey.sim.contracts.observable import Observable
+from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario, Transition
+from marl_airhockey.sim.contracts.units import (
     Degrees,
     Latency,
     Metres,
@@ -16,13 +16,13 @@ from marl_airhockey.contracts.units import (
     Speed,
     Weight,
 )
-from marl_airhockey.core.errors import require, unknown_name
-from marl_airhockey.core.geometry import clip, length
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.seat import Seat
-from marl_airhockey.core.state import State
-from marl_airhockey.core.table import Obstacle, Table
+from marl_airhockey.sim.core.errors import require, unknown_name
+from marl_airhockey.sim.core.geometry import clip, length
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.scene import GoalLine, Scene
+from marl_airhockey.sim.core.seat import Seat
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.core.table import Obstacle, Table
 from marl_airhockey.types import Array, Memory
 
 __all__ = [

@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from marl_airhockey.contracts.observable import Observable
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.state import State
+from marl_airhockey.sim.contracts.observable import Observable
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.scene import GoalLine, Scene
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.toolkit import observables, starts
 from marl_airhockey.types import Array, Memory
 

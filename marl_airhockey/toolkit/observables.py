@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.contracts.observable import (
+from marl_airhockey.sim.contracts.observable import (
     HISTORY,
     PENDING,
     Column,
@@ -17,9 +17,9 @@ from marl_airhockey.contracts.observable import (
     Observable,
     ObservationContext,
 )
-from marl_airhockey.core.parameters import PUCK_SPEED_CAP
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.touches import touched
+from marl_airhockey.sim.core.parameters import PUCK_SPEED_CAP
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.touches import touched
 from marl_airhockey.types import Array
 
 

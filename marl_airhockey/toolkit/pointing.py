@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import View
-from marl_airhockey.core.geometry import length
+from marl_airhockey.sim.contracts.driver import View
+from marl_airhockey.sim.core.geometry import length
 from marl_airhockey.types import Array
 
 GAIN = 25.0

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Transition
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import reaches
-from marl_airhockey.core.state import State
-from marl_airhockey.core.touches import touched as touched
+from marl_airhockey.sim.contracts.scenario import Transition
+from marl_airhockey.sim.core.geometry import length
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import reaches
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.core.touches import touched as touched
 from marl_airhockey.types import Array, Memory
 
 SLOW = 0.05

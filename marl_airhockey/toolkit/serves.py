@@ -6,12 +6,12 @@ from functools import cache
 
 import numpy as np
 
-from marl_airhockey.core.limits import away
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import ReachPlanes
-from marl_airhockey.core.state import State
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.sim.core.limits import away
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import ReachPlanes
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.toolkit.starts import SPIN
 from marl_airhockey.types import Array
 

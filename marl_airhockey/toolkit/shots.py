@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from marl_airhockey.core.laws import bounce
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.sim.core.laws import bounce
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.toolkit.starts import falling_puck, redraw, roll
 from marl_airhockey.types import Array
 

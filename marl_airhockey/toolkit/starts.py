@@ -8,13 +8,13 @@ from functools import cache
 
 import numpy as np
 
-from marl_airhockey.core.geometry import half_planes
-from marl_airhockey.core.laws import fly, impulse, wall_restitution
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.core.table import GRAVITY
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.sim.core.geometry import half_planes
+from marl_airhockey.sim.core.laws import fly, impulse, wall_restitution
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.core.table import GRAVITY
+from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
 PADDLE_X = (-0.70, -0.60)

@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.core.errors import unknown_name
-from marl_airhockey.core.extrapolation import Walls, extrapolate_rows
-from marl_airhockey.core.geometry import length
-from marl_airhockey.core.laws import impulse
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.jit.cache import compiled, inner
+from marl_airhockey.sim.contracts.driver import Driver, View
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.extrapolation import Walls, extrapolate_rows
+from marl_airhockey.sim.core.geometry import length
+from marl_airhockey.sim.core.laws import impulse
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.jit.cache import compiled, inner
 from marl_airhockey.types import Array
 
 

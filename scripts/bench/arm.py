@@ -19,11 +19,11 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 Step = Callable[[], object]
 """Function that makes one control step"""
@@ -58,7 +58,7 @@ def lift() -> Step:
 
 def stepped_by_robosuite(arms: int, timestep: float) -> Step:
     """Return the step of our environment as robosuite makes it."""
-    from marl_airhockey.backends.robosuite.env import AirHockey
+    from marl_airhockey.sim.backends.robosuite.env import AirHockey
 
     env: Any = AirHockey(scene=make_scene(arms), timestep=timestep)
     env.reset()

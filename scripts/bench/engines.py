@@ -23,12 +23,12 @@ from rich.console import Console
 from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.learn.engine import AdaptiveRate
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.sb3 import build_model
 from marl_airhockey.learn.self_play import make_training_env
+from marl_airhockey.sim.core.errors import require
 
 
 class Iteration(NamedTuple):

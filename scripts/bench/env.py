@@ -37,7 +37,7 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.backends.pymunk.backend import PymunkBackend
+from marl_airhockey.sim.backends.pymunk.backend import PymunkBackend
 
 Play = Callable[[], int]
 """Steps for a moment and says how many env-steps that were."""

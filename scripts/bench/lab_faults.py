@@ -26,16 +26,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
 from marl_airhockey.hardware.lab.faults import ARM_FAULTS, TABLE_FAULTS
 from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
 from marl_airhockey.hardware.ur_emulator.faults import FAULTS
-from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.policies.load import load_policy
+from marl_airhockey.sim.jit.folders import cache_folder
+from marl_airhockey.sim.world.keywords import Keywords
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_driven_world
-from marl_airhockey.world.keywords import Keywords
-from marl_airhockey.world.world import World
 
 BEFORE, LISTEN = 20, 80
 """Control steps before a fault, and the most after it"""

@@ -26,14 +26,14 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.profiles import find_profile
+from marl_airhockey.build import build_driven_world, build_world
 from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
 from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
-from marl_airhockey.jit.folders import cache_folder
 from marl_airhockey.policies.load import load_policy
+from marl_airhockey.sim.core.profiles import find_profile
+from marl_airhockey.sim.jit.folders import cache_folder
+from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_driven_world, build_world
-from marl_airhockey.world.keywords import Keywords
 
 STEPS, CHANGES, PAUSE = 400, 40, 8
 """Control steps of the juggler; changes of the command, and steps between them"""

@@ -19,8 +19,8 @@ from pathlib import Path
 from marl_airhockey.evaluation.evaluate import EvaluationResult, evaluate
 from marl_airhockey.hardware.calibration.lab_rig import calibrate_lab
 from marl_airhockey.hardware.lab.lab import Lab, LabClient, served
-from marl_airhockey.jit.folders import cache_folder
-from marl_airhockey.sensing.simulated_camera import SENSED
+from marl_airhockey.sim.jit.folders import cache_folder
+from marl_airhockey.sim.sensing.simulated_camera import SENSED
 
 TASKS = ("reach", "reach_velocity", "touch", "juggle", "puck_velocity")
 EXACT = (*SENSED, "action_delay", "servo_time")

@@ -16,12 +16,12 @@ import numpy as np
 import typer
 from scaling import BLOCKS, PADDLES, PUCKS
 
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 WORLDS, REVERSAL = 8, 4
 """Number of worlds; steps for which a paddle keeps its velocity"""

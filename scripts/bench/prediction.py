@@ -22,12 +22,12 @@ import typer
 from rich.console import Console
 from rich.table import Table as RichTable
 
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import Given, Physics
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import Table
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.physics import Given, Physics
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 HORIZONS = (0.1, 0.25, 0.5, 1.0)

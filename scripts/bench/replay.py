@@ -20,7 +20,7 @@ import marl_airhockey as ah
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.summary import summarize_recording
 from marl_airhockey.data.verify import replay_differences
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.world.keywords import Keywords
 
 
 def replayed(name: str, profile: str, episodes: int, folder: Path) -> str:

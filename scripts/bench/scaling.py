@@ -21,13 +21,13 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
-from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
+from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 
 Steps = Callable[[], tuple[float, int]]
 """Function that steps for a moment and returns CPU-seconds and calls"""

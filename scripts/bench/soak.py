@@ -26,12 +26,12 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
 from marl_airhockey.hardware.robot import DriverState, Fault
 from marl_airhockey.hardware.ur_emulator.arm import DT
 from marl_airhockey.hardware.ur_emulator.faults import FAULTS
 from marl_airhockey.hardware.ur_emulator.motions import Line
+from marl_airhockey.sim.core.geometry import half_planes
 
 CONTROL_DT = 0.05
 OF_CONNECTIONS = ("forgotten_recipes", "late_state")

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from marl_airhockey.core.physics import Physics
 from marl_airhockey.hardware.camera import Frame
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import (
@@ -39,6 +38,7 @@ from marl_airhockey.hardware.vision.calibration import (
 )
 from marl_airhockey.hardware.vision.edges import refine_corners
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.types import Array
 
 SERVE = 5.0

@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.sim.contracts.scenario import GoalScenario
 
 WORLDS, STEPS = 3, 200
 TOLERANCE = {"numba": 0.0, "pymunk": 1e-9}

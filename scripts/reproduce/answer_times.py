@@ -19,9 +19,9 @@ import numpy as np
 import typer
 
 import marl_airhockey as ah
-from marl_airhockey.core.profiles import PROFILES
+from marl_airhockey.sim.core.profiles import PROFILES
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.world import World
 
 STEP, STEPS, SHARE = 0.005, 200, 0.5
 """Control step of the measurement, s, its number, and the action"""

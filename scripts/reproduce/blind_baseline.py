@@ -25,14 +25,14 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.cli.options import settings
-from marl_airhockey.contracts.driver import Driver, View
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_driven_world
 
 CANDIDATES, PLAYED, ELITE, GENERATIONS = 96, 48, 12, 12
 """Candidates of a generation, episodes of each, and those whose mean is the next"""

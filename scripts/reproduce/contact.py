@@ -18,9 +18,9 @@ from rich.console import Console
 from rich.table import Table
 
 import marl_airhockey as ah
-from marl_airhockey.core.seat import ReachPlanes
+from marl_airhockey.sim.core.seat import ReachPlanes
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.world import World
 
 JOINT_LIMIT = 0.9 * np.pi
 """Limit of a joint's speed, rad/s"""

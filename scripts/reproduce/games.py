@@ -23,7 +23,6 @@ from rich.console import Console
 from rich.table import Table
 
 from marl_airhockey.cli.league import SCRIPTS
-from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.crossplay import crossplay
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
@@ -33,8 +32,9 @@ from marl_airhockey.learn.self_play_config import OPPONENTS
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
-from marl_airhockey.render.charts import DPI, INK, INKS, save, tidy
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
+from marl_airhockey.sim.world.keywords import Keywords
 
 COOPERATIVE = ("rally", "team_juggle")
 ON_NUMBA: Keywords = {"backend": "numba"}

@@ -27,8 +27,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from marl_airhockey.core.physics import SIMULATED
-from marl_airhockey.core.profiles import find_profile
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.evaluation.comparison import (
     Comparison,
     Estimates,
@@ -43,8 +42,9 @@ from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.rollout.rollout import play_episodes
-from marl_airhockey.world.build import build_driven_world
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.core.physics import SIMULATED
+from marl_airhockey.sim.core.profiles import find_profile
+from marl_airhockey.sim.world.keywords import Keywords
 
 OPTIONS = {"table": LabSetup().table}
 EPISODES = 1000

@@ -13,9 +13,9 @@ import numpy as np
 import typer
 
 import marl_airhockey as ah
-from marl_airhockey.render.picture import draw
-from marl_airhockey.render.renderer import Renderer
 from marl_airhockey.rollout.play import play
+from marl_airhockey.sim.render.picture import draw
+from marl_airhockey.sim.render.renderer import Renderer
 from marl_airhockey.types import Array
 
 COLUMNS = 2

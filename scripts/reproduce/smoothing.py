@@ -24,9 +24,7 @@ import numpy as np
 import typer
 from rows import DATA, Again, Book, Row, RowsFile
 
-from marl_airhockey.contracts.driver import Driver, PrescribedMotion, View
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.seat import Seat
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
@@ -34,8 +32,10 @@ from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.robot import PRESETS, DriverState, Preset, Smoothing
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.rollout import play as episodes_of
+from marl_airhockey.sim.contracts.driver import Driver, PrescribedMotion, View
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_driven_world
 
 POLICIES = {"juggle": "zoo/juggle_ur5e", "hit_goal": "zoo/hit_goal_ur5e"}
 FILTERS = (

@@ -15,8 +15,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from marl_airhockey.study.answers import ANSWERS, GAMES, Answers
-from marl_airhockey.study.tables import by_opponent, by_question
+from marl_airhockey.play.study.answers import ANSWERS, GAMES, Answers
+from marl_airhockey.play.study.tables import by_opponent, by_question
 from marl_airhockey.types import Array
 
 PARTICIPANTS, GAMES_EACH = 24, 3

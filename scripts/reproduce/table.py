@@ -34,8 +34,6 @@ import typer
 from rows import DATA, Again, Book, Row, RowsFile, in_folder, read, run_folder
 
 from marl_airhockey import make_agent
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.core.parameters import PRESETS
 from marl_airhockey.data.benchmark.build import get_dataset
 from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.data.record import record_steps
@@ -45,7 +43,9 @@ from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.core.parameters import PRESETS
+from marl_airhockey.sim.world.keywords import Keywords
 
 ALGOS: dict[str, tuple[str, dict[str, Any]]] = {
     "bc": ("bc", {"total_steps": 20_000}),

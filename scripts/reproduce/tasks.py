@@ -33,8 +33,8 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.sensing.simulated_camera import SENSED
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.sensing.simulated_camera import SENSED
+from marl_airhockey.sim.world.keywords import Keywords
 
 EPISODES, SLOW_EPISODES = 2000, 200
 """Episodes by which a policy is measured, and on the slower backends"""

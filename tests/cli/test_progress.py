@@ -3,7 +3,7 @@
 import time
 
 from marl_airhockey.cli import progress
-from marl_airhockey.jit import notices
+from marl_airhockey.sim.jit import notices
 
 
 def test_lines_say_what_is_done_and_how_long_it_takes(capsys, monkeypatch):

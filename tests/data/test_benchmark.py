@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from marl_airhockey.contracts.driver import Driver
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.data.benchmark import synthetic
 from marl_airhockey.data.benchmark.build import build_dataset, built
 from marl_airhockey.data.benchmark.catalogue import (
@@ -29,7 +29,7 @@ from marl_airhockey.data.files import one_recording, recordings_in
 from marl_airhockey.data.reader import read_head
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import make_agent
-from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.sim.contracts.driver import Driver
 
 NAME = "airhockey/touch/medium-replay-v0"
 

@@ -9,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
-from marl_airhockey.core.recording import FILM
 from marl_airhockey.data.exchange.formats import FORMATS, find_format, import_dataset
 from marl_airhockey.data.exchange.lerobot import export_lerobot
 from marl_airhockey.data.exchange.settings import ImportSettings
@@ -23,6 +22,7 @@ from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import relabelled
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.core.recording import FILM
 
 pd = pytest.importorskip("pandas")
 pq = pytest.importorskip("pyarrow.parquet")

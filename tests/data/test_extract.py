@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.data.extract import extract
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import lab_view
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.vision import Colour
-from marl_airhockey.render.mp4 import Mp4Writer
+from marl_airhockey.sim.core.table import TABLES
+from marl_airhockey.sim.render.mp4 import Mp4Writer
 
 VIEW = lab_view(TABLES["full_size"])
 RIG = Rig(

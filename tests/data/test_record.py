@@ -7,13 +7,13 @@ import pytest
 from pyarrow import parquet as pq
 
 import marl_airhockey as ah
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.data.derived import divided, merged
 from marl_airhockey.data.files import recordings_in
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.summary import summarize_recording
 from marl_airhockey.rollout.columns import memories_of, scenario_of, states_of
-from marl_airhockey.world.build import build_driven_world
 
 
 def record(tmp_path, agent, scenario, episodes=3, **keywords):

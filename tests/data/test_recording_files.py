@@ -12,7 +12,6 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from marl_airhockey.core.recording import FORMAT
 from marl_airhockey.data import writer
 from marl_airhockey.data.derived import repaired
 from marl_airhockey.data.files import whole_recordings_in
@@ -26,6 +25,7 @@ from marl_airhockey.data.reader import (
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.writer import PART, RecordingWriter
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.core.recording import FORMAT
 
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")

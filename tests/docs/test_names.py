@@ -13,12 +13,12 @@ import typer.main
 
 import marl_airhockey as ah
 from marl_airhockey.cli.main import app
-from marl_airhockey.contracts.observable import OBSERVE
-from marl_airhockey.core.parameters import PARAMETERS
 from marl_airhockey.learn.hindsight.config import HindsightConfig
 from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.ppo_config import PPOConfig
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.contracts.observable import OBSERVE
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.world.keywords import Keywords
 
 ROOT = Path(__file__).parents[2]
 PAGES = [

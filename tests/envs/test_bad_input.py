@@ -9,13 +9,13 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.contracts.units import UNITS
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES, Table
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.contracts.units import UNITS
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES, Table
 
 CORNERS = TABLES["standard"].vertices
 GOOD = {"paddle_0": np.zeros(2, np.float32)}

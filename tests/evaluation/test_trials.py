@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.cli.main import app
 from marl_airhockey.evaluation.comparison import Outcomes, compare
 from marl_airhockey.evaluation.trial_sheet import TrialRow, TrialSheet, plan_trials
 from marl_airhockey.evaluation.trials import play_trials, spread, spread_starts
 from marl_airhockey.registry import make_agent
-from marl_airhockey.world.build import build_driven_world
 
 METHODS = {"new": ["sticky", "random"], "old": ["still"]}
 

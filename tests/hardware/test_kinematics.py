@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.lab.setup import TOOL, LabSetup
 from marl_airhockey.hardware.robot.kinematics import (
     forward,
@@ -12,6 +10,8 @@ from marl_airhockey.hardware.robot.kinematics import (
     pose_of,
     pose_vector,
 )
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 
 def test_stretched_out_it_is_as_long_as_its_links():

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.robot import MotionLimits, RobotConfig
 from marl_airhockey.hardware.robot.motion import Motion
 from marl_airhockey.hardware.robot.nominal import nominal_mounting
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 TABLE = TABLES["full_size"]
 REACH = make_seat("robot", TABLE, 0).reach

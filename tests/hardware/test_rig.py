@@ -6,8 +6,7 @@ from dataclasses import MISSING, fields, replace
 import numpy as np
 import pytest
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
+from marl_airhockey.build import table_keywords
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import lab_view, tag_places
 from marl_airhockey.hardware.rig import Pendant, Rig
@@ -15,7 +14,8 @@ from marl_airhockey.hardware.robot import ServoSettings
 from marl_airhockey.hardware.robot.shaper import MotionLimits
 from marl_airhockey.hardware.vision import Colour
 from marl_airhockey.hardware.vision.calibration import tag_corners
-from marl_airhockey.world.build import table_keywords
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 TABLE = TABLES["full_size"]
 TAGS = {str(k): tag_corners(p).tolist() for k, p in tag_places(TABLE).items()}

@@ -5,11 +5,11 @@ import threading
 import numpy as np
 import pytest
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.robot import Robot, RobotConfig
 from marl_airhockey.hardware.robot.mailbox import Mailbox
 from marl_airhockey.hardware.robot.nominal import nominal_mounting
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 TABLE = TABLES["full_size"]
 CONFIG = RobotConfig("", nominal_mounting(TABLE), make_seat("robot", TABLE, 0).reach)

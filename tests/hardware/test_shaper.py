@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from marl_airhockey.core.geometry import half_planes
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.robot.shaper import MotionLimits, Shaper
+from marl_airhockey.sim.core.geometry import half_planes
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 REACH = make_seat("robot", TABLES["full_size"], 0).reach
 LIMITS, DT = MotionLimits(), 0.008

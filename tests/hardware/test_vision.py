@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.camera import Frame
 from marl_airhockey.hardware.lab.table_camera import (
     Seen,
@@ -24,6 +23,7 @@ from marl_airhockey.hardware.vision.calibration import (
     view_from_tags,
     view_trouble,
 )
+from marl_airhockey.sim.core.table import TABLES
 
 TABLE = TABLES["full_size"]
 VIEW = lab_view(TABLE)

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.parameters import PARAMETERS, PRESETS
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.parameters import PARAMETERS, PRESETS
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 TABLE = TABLES["standard"]
 DT = 0.05

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from marl_airhockey.jit.folders import code_folder
+from marl_airhockey.sim.jit.folders import code_folder
 
 MOST = 8.0
 """CPU-seconds of a test without the mark `slow`"""

@@ -1,8 +1,7 @@
 """Names that tests are made for, beside those of the library's lists."""
 
-import importlib
-
 import marl_airhockey as ah
+from marl_airhockey.sim.backends.find import simulated_backend, simulated_names
 
 GOALS = ["hit_goal", "hit_goal_velocity", "reach", "reach_velocity"]
 
@@ -12,6 +11,5 @@ def seats(scenario):
 
 
 def ideal_backends():
-    modules = {n: f"marl_airhockey.backends.{n}" for n in ah.backend_names()}
-    made = {n: importlib.import_module(m).make for n, m in modules.items()}
-    return [name for name, kind in made.items() if kind.instant_contacts]
+    kinds = {name: simulated_backend(name) for name in simulated_names()}
+    return [name for name, kind in kinds.items() if kind.instant_contacts]

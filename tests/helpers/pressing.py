@@ -5,15 +5,15 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.geometry import clip
-from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.seat import Seat
-from marl_airhockey.core.table import Table
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.geometry import clip
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import Seat
+from marl_airhockey.sim.core.table import Table
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.toolkit import observables
-from marl_airhockey.world.world import World
 
 LIMITS = {"robot": (0.7, 7.0), "arcade": (5.0, 50.0)}
 

@@ -5,7 +5,7 @@ import json
 from pages import line
 
 from marl_airhockey.play.live_match import RATE
-from marl_airhockey.study.plan_file import load_plan
+from marl_airhockey.play.study.plan_file import load_plan
 
 PLAN = """
 scenario = "duel"

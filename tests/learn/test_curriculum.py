@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import marl_airhockey as ah
-from marl_airhockey.core.rng import RandomStreams
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
+from marl_airhockey.sim.core.rng import RandomStreams
 
 
 def test_a_narrow_range_is_a_share_about_the_middle():

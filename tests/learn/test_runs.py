@@ -20,7 +20,7 @@ from marl_airhockey.learn.ppo_config import PPOConfig, preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.runs import RUN_FORMAT
-from marl_airhockey.transfer.measure import fine_tuning_config
+from marl_airhockey.system_id.measure import fine_tuning_config
 
 
 @pytest.mark.parametrize("found", [1, 99])

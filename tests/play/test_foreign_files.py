@@ -8,12 +8,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from marl_airhockey.core.recording import EPISODES, META, STEPS
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.replay import replay_of
 from marl_airhockey.play.report import summarize
+from marl_airhockey.sim.core.recording import EPISODES, META, STEPS
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.study.answers import read_answers
-from marl_airhockey.study.archive import DIARY, diaries
-from marl_airhockey.study.study import open_study
+from marl_airhockey.play.study.answers import read_answers
+from marl_airhockey.play.study.archive import DIARY, diaries
+from marl_airhockey.play.study.study import open_study
 
 
 def run_a_match(session, client, ticks):

@@ -9,12 +9,12 @@ from typer.testing import CliRunner
 
 import marl_airhockey as ah
 from marl_airhockey.cli.main import app
-from marl_airhockey.core.recording import Recording
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import fitting, relabelled
 from marl_airhockey.data.verify import EXACT, distance, replay_differences
 from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.sim.core.recording import Recording
 
 
 def recorded(path, scenario, episodes=3, **keywords):

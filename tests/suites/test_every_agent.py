@@ -5,9 +5,9 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.core.rng import StreamSet
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import agent_class, make_agent
+from marl_airhockey.sim.core.rng import StreamSet
 
 
 def play(scenario, agent, worlds, steps, seed, **keywords):

@@ -9,12 +9,12 @@ from names import ideal_backends
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.parameters import PARAMETERS, PUCK_SPEED_CAP
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import GRAVITY, Obstacle, Table
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.parameters import PARAMETERS, PUCK_SPEED_CAP
+from marl_airhockey.sim.core.scene import GoalLine, Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import GRAVITY, Obstacle, Table
 from marl_airhockey.toolkit.starts import roll
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import marl_airhockey as ah
-from marl_airhockey.core.profiles import PROFILES
 from marl_airhockey.evaluation import evaluate as evaluation
 from marl_airhockey.play import match_drivers
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.registry import make_agent
-from marl_airhockey.world.roster import Roster
+from marl_airhockey.sim.core.profiles import PROFILES
+from marl_airhockey.sim.world.roster import Roster
 
 STEPS = 60
 SCENARIOS = "juggle", "team_juggle", "duel"

@@ -21,12 +21,12 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.scenario import Scenario, Transition
-from marl_airhockey.core.state import ARRAYS
 from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import term_meanings
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.sim.contracts.scenario import Scenario, Transition
+from marl_airhockey.sim.core.state import ARRAYS
 
 CHANCE = {"still": 0.02, "random": 0.10, "sticky": 0.10}
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.parameters import PARAMETERS
-from marl_airhockey.core.scene import GoalLine, Scene
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES, Obstacle, Table
 from marl_airhockey.registry import find_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.scene import GoalLine, Scene
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES, Obstacle, Table
 
 TABLE = TABLES["standard"]
 DT = 0.05

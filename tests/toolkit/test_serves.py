@@ -5,7 +5,7 @@ import pytest
 from situations import idle
 
 import marl_airhockey as ah
-from marl_airhockey.core.rng import RandomStreams
+from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.toolkit.serves import GAP, most_served, serve
 
 pytestmark = pytest.mark.usefixtures("uncompiled")

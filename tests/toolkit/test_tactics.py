@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.contracts.driver import Driver
 
 REACTION, NOISE = 0.2, 0.012
 """Reaction of a person, s, and how far it misjudges where a puck is, m"""

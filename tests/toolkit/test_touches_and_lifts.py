@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 import marl_airhockey as ah
-from marl_airhockey.contracts.scenario import Transition
-from marl_airhockey.core.touches import TOUCH_GAP, count_touches, no_touches
+from marl_airhockey.sim.contracts.scenario import Transition
+from marl_airhockey.sim.core.touches import TOUCH_GAP, count_touches, no_touches
 from marl_airhockey.toolkit.rewards import lifts, no_lifts
 
 DT = 0.05

@@ -14,7 +14,7 @@ from marl_airhockey.data.benchmark.catalogue import (
 from marl_airhockey.data.benchmark.croissant import write_card
 from marl_airhockey.data.files import PREFIX, dataset_folder, whole_folder
 from marl_airhockey.data.record import record_steps
-from marl_airhockey.world.keywords import Keywords
+from marl_airhockey.sim.world.keywords import Keywords
 
 
 def build_dataset(

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 
-from marl_airhockey.contracts.driver import Driver
 from marl_airhockey.data.benchmark.synthetic import SyntheticHuman
 from marl_airhockey.data.files import PREFIX
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.contracts.driver import Driver
 
 VERSION = 0
 """Version of all datasets: it grows when players, tasks or physics change"""

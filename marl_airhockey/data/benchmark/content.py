@@ -8,10 +8,10 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.data.files import recordings_in
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.data.summary import summarize_recording
+from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.types import Array
 
 PUBLISHED = Path(__file__).parent / "published.json"

@@ -8,11 +8,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from marl_airhockey.core.recording import EPISODES, META, STEPS
 from marl_airhockey.data.benchmark.catalogue import NamedDataset
 from marl_airhockey.data.benchmark.content import references
 from marl_airhockey.data.parquet import KEYS
 from marl_airhockey.data.reader import read_head
+from marl_airhockey.sim.core.recording import EPISODES, META, STEPS
 
 CARD = "croissant.json"
 """Name of the file"""

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from marl_airhockey.contracts.driver import Driver, View
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.seat import Seat
+from marl_airhockey.sim.contracts.driver import Driver, View
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.seat import Seat
 from marl_airhockey.types import Array
 
 LATENCY = (0.05, 0.2)

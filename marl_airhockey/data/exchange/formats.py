@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.data.exchange.lerobot import export_lerobot
 from marl_airhockey.data.exchange.lerobot_reader import import_lerobot
 from marl_airhockey.data.exchange.lerobot_writer import INFO
@@ -18,6 +17,7 @@ from marl_airhockey.data.exchange.trajectories import (
     export_trajectories,
     import_trajectories,
 )
+from marl_airhockey.sim.core.errors import unknown_name
 
 
 class Export(Protocol):

@@ -15,8 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import FILM, Columns, Episode
 from marl_airhockey.data.exchange.lerobot_writer import (
     LeRobotWriter,
 )
@@ -31,6 +29,8 @@ from marl_airhockey.data.exchange.seats import (
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.film import count_frames, film_gap
 from marl_airhockey.make import parallel_env
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.recording import FILM, Columns, Episode
 from marl_airhockey.types import Array
 
 STATE = ("position", "velocity", "angle", "spin")

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import PLAYED, Columns
 from marl_airhockey.data.exchange.lerobot import ACTION, OBSERVATION
 from marl_airhockey.data.exchange.lerobot_writer import (
     CODE,
@@ -23,6 +22,7 @@ from marl_airhockey.data.exchange.seats import check_shapes
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.parquet import read_table
 from marl_airhockey.data.writer import whole_recording
+from marl_airhockey.sim.core.recording import PLAYED, Columns
 from marl_airhockey.types import Array
 
 NEEDED = (OBSERVATION, ACTION, "next.reward", "next.done")

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.recording import Columns
 from marl_airhockey.data.film import FilmFrames
-from marl_airhockey.render.mp4 import Mp4Writer
+from marl_airhockey.sim.core.recording import Columns
+from marl_airhockey.sim.render.mp4 import Mp4Writer
 from marl_airhockey.types import Array
 
 CODE = "v3.0"

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.recording import Columns, Recording
-from marl_airhockey.core.rng import RandomStreams
-from marl_airhockey.core.state import RESULTS, Kind
 from marl_airhockey.data.exchange.measured_events import Path, fill_events
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.registry import REAL, make_scenario
 from marl_airhockey.rollout.columns import SENSED, STATE, scenario_of
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.recording import Columns, Recording
+from marl_airhockey.sim.core.rng import RandomStreams
+from marl_airhockey.sim.core.state import RESULTS, Kind
 from marl_airhockey.types import Array
 
 BEYOND = 0.1

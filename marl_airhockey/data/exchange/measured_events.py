@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
 from marl_airhockey.hardware.table.events import Track, find_contacts
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
 
 

@@ -20,8 +20,6 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import PLAYED, Episode
 from marl_airhockey.data.benchmark.catalogue import PROFILE
 from marl_airhockey.data.benchmark.content import references
 from marl_airhockey.data.exchange.seats import (
@@ -37,6 +35,8 @@ from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.files import shared_head
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.discovery import gymnasium_id
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.recording import PLAYED, Episode
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from marl_airhockey.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.data.exchange.measured import (
     Measured,
     interpolated,
@@ -30,6 +29,7 @@ from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.rollout.columns import SENSED, STATE
+from marl_airhockey.sim.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.types import Array
 
 PUCK, PADDLE = ("t", "x", "y"), ("paddle_x", "paddle_y")

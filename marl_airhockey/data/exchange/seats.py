@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from marl_airhockey.core.recording import Episode
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.make import parallel_env
+from marl_airhockey.sim.core.recording import Episode
 from marl_airhockey.types import Array
 
 GOALS = ("observation", "achieved_goal", "desired_goal")

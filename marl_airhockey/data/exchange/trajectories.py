@@ -17,9 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.contracts.scenario import Scenario
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.data.exchange.measured import (
     Measured,
     measured_head,
@@ -36,6 +33,9 @@ from marl_airhockey.data.exchange.seats import (
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.writer import whole_recording
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.types import Array
 
 FIELDS = {

@@ -14,12 +14,12 @@ from itertools import product
 
 import numpy as np
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.servo import HALF, follow_ramp
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.calibration.motion import Motion, lead
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.servo import HALF, follow_ramp
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 STEP_SPEED, STEP_SECONDS = 0.4, 0.4

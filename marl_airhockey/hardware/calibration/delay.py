@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.calibration.camera_session import PADDLE_TOP
 from marl_airhockey.hardware.calibration.motion import lead
 from marl_airhockey.hardware.camera import Camera, open_source
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot
 from marl_airhockey.hardware.vision import Detector
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 AMPLITUDE, PERIOD = 0.09, 1.0

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.lab.lab import LabClient
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.table import TABLES
 
 GUIDED = 4.0
 """Longest time until the arm has reached the next position, s"""

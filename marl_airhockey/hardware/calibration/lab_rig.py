@@ -14,8 +14,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.camera import Camera, Frame, open_source
 from marl_airhockey.hardware.hand_rig import HandRig
 from marl_airhockey.hardware.lab.camera import PADDLE_TOP
@@ -30,7 +28,9 @@ from marl_airhockey.hardware.vision.calibration import (
     tag_corners,
     view_from_tags,
 )
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.table import TABLES
+from marl_airhockey.sim.jit.folders import cache_folder
 from marl_airhockey.types import Array
 
 PICTURES = 8

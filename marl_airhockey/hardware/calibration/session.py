@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.calibration.camera_session import (
     AVERAGED,
     CameraSession,
@@ -21,6 +20,7 @@ from marl_airhockey.hardware.camera import Camera
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot.mounting import Mounting, fit_mounting
 from marl_airhockey.hardware.vision import Colour, Detector
+from marl_airhockey.sim.core.table import TABLES
 from marl_airhockey.types import Array
 
 TOUCHES = 9

@@ -17,8 +17,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.hardware.camera.camera import Camera, Frame
+from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 SUFFIX = ".mkv"

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.hardware.lab.arm_process import run_arm
 from marl_airhockey.hardware.lab.door import DoorClient, open_door, port_in
 from marl_airhockey.hardware.lab.faults import ARM_FAULTS, FAULTS
 from marl_airhockey.hardware.lab.hand_process import path_of, run_hand
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_process import run_table
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.jit.folders import cache_folder
 
 ANSWER = 5.0
 """Longest time until a process of the lab answers, s"""

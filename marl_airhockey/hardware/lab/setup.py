@@ -7,14 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
-from marl_airhockey.core.seat import Seat, make_seat
-from marl_airhockey.core.table import TABLES, Table
 from marl_airhockey.hardware.robot.kinematics import inverse, pose_of
 from marl_airhockey.hardware.robot.mounting import Mounting
 from marl_airhockey.hardware.robot.nominal import TILT, nominal_mounting
 from marl_airhockey.hardware.ur_emulator.arm import Arm
 from marl_airhockey.hardware.ur_emulator.plant import EmptyTable, Plant
+from marl_airhockey.sim.core.errors import require
+from marl_airhockey.sim.core.seat import Seat, make_seat
+from marl_airhockey.sim.core.table import TABLES, Table
 from marl_airhockey.types import Array
 
 TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.0)

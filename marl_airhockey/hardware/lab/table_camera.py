@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from marl_airhockey.core.table import Table
 from marl_airhockey.hardware.lab.camera import (
     CIRCLE,
     FELT,
@@ -19,6 +18,7 @@ from marl_airhockey.hardware.lab.camera import (
 )
 from marl_airhockey.hardware.lab.drawing import draw_polygon, fill, paste_tag, shade
 from marl_airhockey.hardware.vision.lens import CameraView, Lens
+from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 PUCK, ARM = (42, 40, 205), (96, 92, 90)

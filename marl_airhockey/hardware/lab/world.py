@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from marl_airhockey.backends.find import simulated_backend
-from marl_airhockey.contracts.backend import Command
-from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.rng import StreamSet
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
 from marl_airhockey.hardware.lab.setup import LabSetup
+from marl_airhockey.sim.backends.find import simulated_backend
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.rng import StreamSet
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
 
 RATE = 120.0

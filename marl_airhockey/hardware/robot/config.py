@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from marl_airhockey.core.checks import check_fields
 from marl_airhockey.hardware.robot.filters import Smoothing
 from marl_airhockey.hardware.robot.mounting import Mounting
 from marl_airhockey.hardware.robot.shaper import MotionLimits
+from marl_airhockey.sim.core.checks import check_fields
 
 PAYLOADS = 0.0, 5.0
 """Masses that a UR5e may carry, kg"""

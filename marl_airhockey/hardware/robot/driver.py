@@ -15,7 +15,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.hardware.robot.arm import Arm, ArmFault, Reading
 from marl_airhockey.hardware.robot.config import RobotConfig
 from marl_airhockey.hardware.robot.mailbox import (
@@ -34,6 +33,7 @@ from marl_airhockey.hardware.robot.supervisor import (
     Measured,
     Supervisor,
 )
+from marl_airhockey.sim.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 RATE = 125.0

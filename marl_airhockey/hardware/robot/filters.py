@@ -14,8 +14,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from marl_airhockey.core.checks import check_fields
-from marl_airhockey.core.errors import unknown_name
+from marl_airhockey.sim.core.checks import check_fields
+from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.types import Array
 
 

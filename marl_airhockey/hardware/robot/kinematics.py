@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.jit.cache import compiled
+from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
 JOINTS = 6

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.hardware.robot.kinematics import (
     JOINTS,
     forward,
@@ -22,6 +21,7 @@ from marl_airhockey.hardware.robot.kinematics import (
     pose_of,
 )
 from marl_airhockey.hardware.robot.mounting import Mounting
+from marl_airhockey.sim.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 STATE_PORT = 30012

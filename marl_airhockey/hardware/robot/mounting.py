@@ -8,8 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from marl_airhockey.core.checks import check_fields
 from marl_airhockey.hardware.robot.kinematics import matrix_of, vector_of
+from marl_airhockey.sim.core.checks import check_fields
 from marl_airhockey.types import Array
 
 FULL_ROTATION = 2.0 * np.pi

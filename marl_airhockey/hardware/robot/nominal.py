@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from marl_airhockey.core.seat import Seat, make_seat
-from marl_airhockey.core.table import TABLES, Table
 from marl_airhockey.hardware.robot.kinematics import vector_of
 from marl_airhockey.hardware.robot.mounting import Mounting
+from marl_airhockey.sim.core.seat import Seat, make_seat
+from marl_airhockey.sim.core.table import TABLES, Table
 
 BEHIND = 0.22
 """Distance of the arm's base from the table's edge, m"""

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from marl_airhockey.core.checks import check_fields
-from marl_airhockey.core.geometry import half_planes
+from marl_airhockey.sim.core.checks import check_fields
+from marl_airhockey.sim.core.geometry import half_planes
 from marl_airhockey.types import Array
 
 HALVINGS = 4

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.hardware.robot.arm import ArmFault, Reading
 from marl_airhockey.hardware.robot.config import RobotConfig
+from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
 if TYPE_CHECKING:

@@ -11,12 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from marl_airhockey.contracts.backend import Backend, Command
-from marl_airhockey.contracts.mark import Mark
-from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.camera import Camera, open_source
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import DriverState, Fault, Robot, RobotError
@@ -28,7 +22,13 @@ from marl_airhockey.hardware.vision import Detector, Sighting
 from marl_airhockey.hardware.vision.calibration import view_trouble
 from marl_airhockey.hardware.vision.rectifier import Rectifier
 from marl_airhockey.hardware.vision.watcher import Watcher
-from marl_airhockey.jit.pipeline import Stage
+from marl_airhockey.sim.contracts.backend import Backend, Command
+from marl_airhockey.sim.contracts.mark import Mark
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.core.table import TABLES
+from marl_airhockey.sim.jit.pipeline import Stage
 from marl_airhockey.types import Array
 
 log = logging.getLogger("marl_airhockey.real")

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.sensing.contacts import MARGIN, MOMENTS, contact_time
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.sensing.contacts import MARGIN, MOMENTS, contact_time
 from marl_airhockey.types import Array
 
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from marl_airhockey.contracts.mark import Mark, Meaning
-from marl_airhockey.core.table import Table
 from marl_airhockey.hardware.vision.lens import CameraView
+from marl_airhockey.sim.contracts.mark import Mark, Meaning
+from marl_airhockey.sim.core.table import Table
 from marl_airhockey.types import Array
 
 CIRCLE = np.stack([f(np.linspace(0, 2 * np.pi, 37)) for f in (np.cos, np.sin)], 1)

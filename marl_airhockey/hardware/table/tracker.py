@@ -6,13 +6,13 @@ import time
 
 import numpy as np
 
-from marl_airhockey.core.physics import Physics
-from marl_airhockey.core.scene import Scene
-from marl_airhockey.core.state import State
 from marl_airhockey.hardware.table.events import Track, find_contacts
 from marl_airhockey.hardware.table.innovations import Innovations
 from marl_airhockey.hardware.vision import Sighting
-from marl_airhockey.sensing.estimator import Estimator
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.sensing.estimator import Estimator
 from marl_airhockey.types import Array
 
 SPACING, PAST = 0.01, 40

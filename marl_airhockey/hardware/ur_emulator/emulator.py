@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.hardware.lab.door import open_door
 from marl_airhockey.hardware.ur_emulator.controller import VERSION, Controller
 from marl_airhockey.hardware.ur_emulator.faults import FAULTS
 from marl_airhockey.hardware.ur_emulator.ports import Ports
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.jit.folders import cache_folder
 
 SCHEDULED = re.compile(r"(\w+)@([\d.]+)s?(?:-([\d.]+)s?)?")
 """Form of a scheduled fault: NAME@BEGIN or NAME@BEGIN-END, s"""

@@ -11,7 +11,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from marl_airhockey.core.checks import check_fields
+from marl_airhockey.sim.core.checks import check_fields
 from marl_airhockey.types import Array
 
 

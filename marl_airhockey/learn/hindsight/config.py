@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
 from marl_airhockey.registry import has_goals, scenario_names
+from marl_airhockey.sim.core.errors import unknown_name
 
 ALGO = "sac_her"
 """Name of the algorithm"""

@@ -16,7 +16,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-from marl_airhockey.core.errors import require
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
 from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.engine import (
@@ -33,6 +32,7 @@ from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.sb3 import make_logger
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.torch_weights import policy_of_weights
+from marl_airhockey.sim.core.errors import require
 
 REPORT = 100
 """Steps of all worlds from one report of progress to the next"""

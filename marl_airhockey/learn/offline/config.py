@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from marl_airhockey.core.errors import unknown_name
 from marl_airhockey.data.benchmark.build import built
 from marl_airhockey.data.files import (
     shared_head,
@@ -17,6 +16,7 @@ from marl_airhockey.data.files import (
 )
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.settings import check_names
+from marl_airhockey.sim.core.errors import unknown_name
 
 STEPS = {"bc": 20_000, "iql": 40_000, "td3_bc": 40_000, "rebrac": 40_000}
 """Gradient steps of each algorithm, unless others are given"""

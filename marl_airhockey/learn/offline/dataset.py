@@ -11,9 +11,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from marl_airhockey.core.recording import Episode
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.learn.offline.choice import best_of
+from marl_airhockey.sim.core.recording import Episode
 from marl_airhockey.types import Array
 
 GOALS = tuple(

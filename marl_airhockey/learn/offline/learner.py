@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from marl_airhockey.contracts.scenario import GoalScenario
+from marl_airhockey.build import build_world
 from marl_airhockey.learn.engine import (
     evaluate_and_record,
     load_state,
@@ -23,9 +23,9 @@ from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.sim.contracts.scenario import GoalScenario
+from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
-from marl_airhockey.world.build import build_world
-from marl_airhockey.world.world import World
 
 REPORT = 500
 """Steps from one report of progress to the next"""

@@ -14,9 +14,6 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from marl_airhockey.contracts.driver import Driver
-from marl_airhockey.contracts.observable import FRAMES
-from marl_airhockey.core.scene import Scene
 from marl_airhockey.data.reader import episodes_of
 from marl_airhockey.learn.engine import load_state, save_state, training_threads
 from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
@@ -27,9 +24,12 @@ from marl_airhockey.learn.onnx_export import Graph
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.registry import find_scenario
-from marl_airhockey.sensing.pixels import small_picture
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.observable import FRAMES
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.sensing.pixels import small_picture
+from marl_airhockey.sim.world.observer import PIXELS
 from marl_airhockey.types import Array
-from marl_airhockey.world.observer import PIXELS
 
 REPORT = 100
 """Steps from one report of progress to the next"""

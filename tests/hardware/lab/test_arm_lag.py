@@ -7,15 +7,15 @@ import pytest
 from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
-from marl_airhockey.core.seat import make_seat
-from marl_airhockey.core.servo import HALF
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.calibration.arm import along, chirp, find_lag, steps
 from marl_airhockey.hardware.calibration.motion import Motion, lead
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot
 from marl_airhockey.hardware.robot.config import ServoSettings
 from marl_airhockey.hardware.ur_emulator.script import DEAD_TIME
+from marl_airhockey.sim.core.seat import make_seat
+from marl_airhockey.sim.core.servo import HALF
+from marl_airhockey.sim.core.table import TABLES
 
 HALF_RISE = ServoSettings().look_ahead + DEAD_TIME
 """Time in which the lab's arm makes half of a step, s"""

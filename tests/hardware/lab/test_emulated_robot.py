@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from driven import STEP, UP, drive, moving_robot
 
-from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
 from marl_airhockey.hardware.robot import (
     FILTERS,
@@ -21,6 +20,7 @@ from marl_airhockey.hardware.robot import (
 from marl_airhockey.hardware.ur_emulator.arm import JOINT_ACCELERATION
 from marl_airhockey.hardware.ur_emulator.plant import PlantReading
 from marl_airhockey.hardware.ur_emulator.safety import Safety
+from marl_airhockey.sim.core.geometry import half_planes
 
 LATENCY = {
     **dict.fromkeys(["protective_stop", "emergency_stop", "power_off"], 0.004),

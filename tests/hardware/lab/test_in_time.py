@@ -11,11 +11,11 @@ import pytest
 from emulators import until
 
 import marl_airhockey as ah
-from marl_airhockey.core.recording import PLAYED
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.hardware.table.backend import RealBackend
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.core.recording import PLAYED
 
 EPISODES = 3
 LATE = 0.02

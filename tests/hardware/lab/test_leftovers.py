@@ -9,7 +9,7 @@ import time
 import pytest
 
 from marl_airhockey.hardware.lab.lab import LabClient, port_file
-from marl_airhockey.jit.folders import cache_folder
+from marl_airhockey.sim.jit.folders import cache_folder
 
 OPEN = """
 from marl_airhockey.hardware.lab.lab import Lab, served

@@ -13,7 +13,7 @@ import pytest
 
 from marl_airhockey.hardware.lab.lab import LabClient
 
-PAGE = Path(__file__).parents[2] / "docs/teleop.md"
+PAGE = Path(__file__).parents[3] / "docs/teleop.md"
 SHORTER = {
     "--episodes 26": "--episodes 5",
     "train juggle": "train juggle --steps 20000",

@@ -11,14 +11,14 @@ import pytest
 from typer.testing import CliRunner
 
 import marl_airhockey as ah
+from marl_airhockey.build import build_driven_world
 from marl_airhockey.cli.main import app
-from marl_airhockey.core.errors import UnknownKeywordError
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.hardware.lab.lab import LabClient
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.registry import find_backend, make_agent
-from marl_airhockey.world.build import build_driven_world
+from marl_airhockey.sim.core.errors import UnknownKeywordError
+from marl_airhockey.sim.core.table import TABLES
 
 
 def keywords(rig, **options):

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from marl_airhockey.core.geometry import half_planes
 from marl_airhockey.hardware.robot import (
     DriverState,
     Fault,
@@ -19,6 +18,7 @@ from marl_airhockey.hardware.robot import (
     RobotConfig,
     RobotError,
 )
+from marl_airhockey.sim.core.geometry import half_planes
 
 UP = np.array([0.0, 0.5])
 

@@ -5,9 +5,9 @@ import pytest
 from emulators import ADDRESS, emulator, status, switch
 
 import marl_airhockey as ah
-from marl_airhockey.core.table import TABLES
 from marl_airhockey.hardware.robot.nominal import nominal_mounting
 from marl_airhockey.registry import make_agent
+from marl_airhockey.sim.core.table import TABLES
 
 TWIN = f"ur5e:host={ADDRESS},policy=zoo/reach_ur5e"
 

@@ -1,5 +1,0 @@
-"""Numba backend: the 2D table in one compiled loop."""
-
-from marl_airhockey.backends.numba.backend import make
-
-__all__ = ["make"]

@@ -1,5 +1,0 @@
-"""Pymunk backend: the 2D table on Chipmunk, the readable reference."""
-
-from marl_airhockey.backends.pymunk.backend import make
-
-__all__ = ["make"]

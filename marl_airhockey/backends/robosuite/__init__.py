@@ -1,5 +1,0 @@
-"""Robosuite backend: one UR5e per seat, in MuJoCo."""
-
-from marl_airhockey.backends.robosuite.backend import make
-
-__all__ = ["make"]

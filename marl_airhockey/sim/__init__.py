@@ -1,0 +1,1 @@
+"""Simulation: tables, physics, sensing, worlds and their images."""

@@ -1,0 +1,280 @@
+"""Drift: motion of one world up to the first touch on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marl_airhockey.sim.backends.numba.arrays import (
+    BLOCK_GRIP,
+    DAMPING,
+    DRAG,
+    NORMAL_X,
+    NORMAL_Y,
+    OFFSET,
+    PULL_X,
+    PULL_Y,
+)
+from marl_airhockey.sim.backends.numba.bodies import (
+    ANGLE,
+    AWAY,
+    CX,
+    CY,
+    DX,
+    DY,
+    EX,
+    EY,
+    FRICTION,
+    GX,
+    GY,
+    MASS,
+    NX,
+    NY,
+    PINNED,
+    PUCK,
+    RADIUS,
+    RESTITUTION,
+    SPIN,
+    TINY,
+    VX,
+    VY,
+    X,
+    Y,
+    closing,
+    distance_between,
+)
+from marl_airhockey.sim.backends.numba.geometry import (
+    ahead_of_mouth,
+    distance_to_fixed,
+    in_contact,
+)
+from marl_airhockey.sim.backends.numba.impacts import solve
+from marl_airhockey.sim.backends.numba.near import BOW, list_near_drift
+from marl_airhockey.sim.core.laws import fly, slide
+from marl_airhockey.sim.jit.cache import inner
+from marl_airhockey.types import Array
+
+REFINEMENTS = 5
+"""Number of times that the first touch is looked for, each on another chord."""
+WIDE = 1.7
+"""Factor of the drifts of discs that slide in a jam: they part by 0.9 mm."""
+LATER = 1.1
+"""Share of a chord, a little beyond its end, up to which a touch is looked for."""
+
+
+@inner(error_model="numpy", forceinline=True)
+def drift(
+    m: Array,
+    role: Array,
+    row: Array,
+    walls: Array,
+    obstacles: Array,
+    held: int,
+    edges: int,
+    goal_lines: Array,
+    near: Array,
+    count: int,
+    pairs: Array,
+    contacts: Array,
+    visits: Array,
+    kept: Array,
+    n: int,
+    left: float,
+    h: float,
+    safe: float,
+    sweeps: bool,
+    jam: bool,
+) -> tuple[float, bool, bool]:
+    """Move all bodies by at most h s, until something begins to touch.
+
+    What is in contact does not close: that is solved for the mean velocities.
+
+    Args:
+        m: bodies (N, BODY), moved.
+        role: roles (N,).
+        row: coefficients of the world.
+        walls: walls.
+        obstacles: obstacles.
+        held: see `list_near`.
+        edges: see `list_near`.
+        goal_lines: see `Static`.
+        near: pairs that can meet (count or more, 2).
+        count: their number.
+        pairs: bodies in contact (n or more, 2).
+        contacts: their contacts.
+        visits: work space.
+        kept: work space.
+        n: number of contacts.
+        left: s of the step.
+        h: s.
+        safe: s in which nothing begins to touch.
+        sweeps: whether to end at the first touch.
+        jam: see `solve`.
+
+    Returns:
+        The length of the drift, s, True if ``near`` must be listed again, and whether
+        paddles have yielded to pucks.
+    """
+    stale, most, last, tried = False, h, 0.0, h
+    if jam:
+        slide = WIDE * _longest_slide(m, VX, pairs, contacts, n)
+        h = most = min(h, slide)
+    for attempt in range(REFINEMENTS):
+        _move_freely(m, role, row, left, h)
+        hits = False
+        for c in range(n):
+            i, j = pairs[c, 0], pairs[c, 1]
+            speed = closing(m, DX, i, j, contacts[c, NX], contacts[c, NY])
+            hits |= speed < -TINY and role[j] != PINNED
+        if hits:
+            for c in range(n):
+                contacts[c, RESTITUTION] = contacts[c, FRICTION] = 0.0
+            work = pairs, contacts, visits, kept, n
+            jam = solve(m, role, DX, *work, jam)
+            stale, safe = True, 0.0
+            longest = _longest_slide(m, DX, pairs, contacts, n)
+            longest *= 2.0 * WIDE if jam else 1.0
+            if longest < h and attempt < REFINEMENTS - 1:
+                h = most = longest
+                continue
+            most = most if jam else h
+            fixed = walls, obstacles, held, edges
+            count = list_near_drift(m, role, *fixed, most, near)
+        if h <= safe or not sweeps or attempt == REFINEMENTS - 1:
+            break
+        # The chord to a touch is not the first one, so the touch may come later, too: a
+        # little, as the search does not converge for slow bodies, and not beyond what
+        # the pairs were listed for.
+        furthest = most / h if jam else min(most / h, LATER)
+        chord = m, role, walls, obstacles, goal_lines, near, count, h
+        share = _first_touch(*chord, furthest)
+        # At the cap on speed, a body moves less than half of `TOUCH` in this time.
+        if share == furthest or abs(share - 1.0) * h < 4e-8:
+            break
+        error = np.log(max(share, 1e-9))
+        if jam and error > 0.0 > last:
+            # Bodies that are pressed start from rest, so that their paths grow faster
+            # than the time: by the secant of both errors.
+            share = max(np.exp(error * np.log(h / tried) / (last - error)), 0.1)
+        last, tried = error, h
+        h = min(max(h * share, 1e-9), most)
+    for i in range(len(m)):
+        if role[i] == PINNED:
+            continue
+        m[i, X] += m[i, DX] * h
+        m[i, Y] += m[i, DY] * h
+        # The mean of a constant acceleration: what a contact took from the mean, it
+        # took twice from the end.
+        m[i, VX] = m[i, EX] + 2.0 * (m[i, DX] - m[i, CX])
+        m[i, VY] = m[i, EY] + 2.0 * (m[i, DY] - m[i, CY])
+        m[i, ANGLE] += m[i, SPIN] * h
+    return h, stale, jam
+
+
+@inner(error_model="numpy")
+def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> float:
+    """Return the longest drift in which discs that slide on each other part by `BOW`.
+
+    They part as a tangent does from its circle; ``at`` is the column of velocities.
+    """
+    longest = np.inf
+    for c in range(n):
+        i, j = pairs[c, 0], pairs[c, 1]
+        if i >= 0:
+            tx, ty = -contacts[c, NY], contacts[c, NX]
+            speed = abs(closing(m, at, i, j, tx, ty))
+            room = np.sqrt(2.0 * BOW * (m[i, RADIUS] + m[j, RADIUS]))
+            longest = min(longest, room / max(speed, 1e-9))
+    return float(longest)
+
+
+@inner(error_model="numpy", forceinline=True)
+def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> None:
+    """Fill the mean and last velocities of a drift without contacts."""
+    for i in range(len(m)):
+        vx, vy = m[i, VX], m[i, VY]
+        if m[i, MASS] == 0.0:
+            share = h / left
+            m[i, EX] = vx + (m[i, GX] - vx) * share
+            m[i, EY] = vy + (m[i, GY] - vy) * share
+            m[i, CX], m[i, CY] = 0.5 * (vx + m[i, EX]), 0.5 * (vy + m[i, EY])
+        elif role[i] >= AWAY:
+            m[i, EX] = m[i, EY] = m[i, CX] = m[i, CY] = 0.0
+        else:
+            gx, gy = row[PULL_X], row[PULL_Y]
+            if role[i] == PUCK:
+                x, y, ex, ey = fly(vx, vy, h, gx, gy, row[DAMPING], row[DRAG])
+            else:
+                x, y, ex, ey = slide(vx, vy, h, gx, gy, row[BLOCK_GRIP])
+            m[i, EX], m[i, EY], m[i, CX], m[i, CY] = ex, ey, x / h, y / h
+        m[i, DX], m[i, DY] = m[i, CX], m[i, CY]
+
+
+@inner(error_model="numpy", forceinline=True)
+def _first_touch(
+    m: Array,
+    role: Array,
+    walls: Array,
+    obstacles: Array,
+    goal_lines: Array,
+    near: Array,
+    count: int,
+    h: float,
+    first: float,
+) -> float:
+    """Return the share of h s until two bodies touch or a puck crosses a goal line.
+
+    It is ``first`` where neither comes before.
+    """
+    for k in range(count):
+        i, j = near[k, 0], near[k, 1]
+        if role[j] >= AWAY or (i >= 0 and role[i] >= AWAY):
+            continue
+        gap, nx, ny = distance_between(m, i, j, walls, obstacles)
+        way = closing(m, DX, i, j, nx, ny) * h
+        # Distances to convex objects are convex: they fall no faster than at first.
+        if gap + way * first >= 0.0 or in_contact(gap, way / h):
+            continue
+        if i < 0:
+            first = min(first, _touch_fixed(m, j, -1 - i, walls, obstacles, h, first))
+            continue
+        x, y = (m[j, DX] - m[i, DX]) * h, (m[j, DY] - m[i, DY]) * h
+        touch = m[i, RADIUS] + m[j, RADIUS]
+        along, between = (gap + touch) * way, gap * (gap + 2.0 * touch)
+        root = along * along - (x * x + y * y) * between
+        if root > 0.0:
+            first = min(first, between / (np.sqrt(root) - along))
+    for g in range(len(goal_lines)):
+        f = goal_lines[g, 1]
+        for i in range(len(m)):
+            if f < 0 or role[i] != PUCK:
+                continue
+            x, y, nx, ny = m[i, X], m[i, Y], walls[f, NORMAL_X], walls[f, NORMAL_Y]
+            way = (nx * m[i, DX] + ny * m[i, DY]) * h
+            ahead = nx * x + ny * y + walls[f, OFFSET]
+            if way < 0.0 < ahead < -way * first:
+                share = ahead / -way
+                x, y = x + m[i, DX] * h * share, y + m[i, DY] * h * share
+                if ahead_of_mouth(x, y, walls, f) < np.inf:
+                    first = share
+    return first
+
+
+@inner(error_model="numpy")
+def _touch_fixed(
+    m: Array, j: int, f: int, walls: Array, obstacles: Array, h: float, most: float
+) -> float:
+    """Return the share of h s until body j touches a fixed object.
+
+    It is ``most`` or more where it does not. By Newton's method, whose steps never
+    pass the first zero of a convex function.
+    """
+    share, x, y = 0.0, m[j, DX] * h, m[j, DY] * h
+    for _ in range(12):
+        px, py = m[j, X] + share * x, m[j, Y] + share * y
+        gap, nx, ny = distance_to_fixed(px, py, f, walls, obstacles)
+        gap -= m[j, RADIUS]
+        slope = nx * x + ny * y
+        if gap < 1e-9 or slope >= 0.0 or share >= most:
+            return share if gap < 1e-9 else np.inf
+        share -= gap / slope
+    return share

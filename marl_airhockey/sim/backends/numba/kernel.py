@@ -1,0 +1,116 @@
+"""Kernel of the 2D table: one control step of B worlds in one compiled loop.
+
+A world in which nothing can meet moves in one piece (`flight`), any other one from
+contact to contact (`busy`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from marl_airhockey.sim.backends._planar.paddles import follow
+from marl_airhockey.sim.backends.numba.arrays import (
+    Batch,
+    Commands,
+    Previous,
+    Result,
+    Static,
+)
+from marl_airhockey.sim.backends.numba.bodies import BODY, CONTACT
+from marl_airhockey.sim.backends.numba.busy import advance_busy
+from marl_airhockey.sim.backends.numba.flight import block_space, fly_freely
+from marl_airhockey.sim.jit.cache import compiled
+from marl_airhockey.types import Array
+
+
+def work_space(static: Static, worlds: int) -> tuple[Array, Array]:
+    """Return the work space of a kernel for B worlds, of which parts use one row.
+
+    Rows that are not used take no memory.
+    """
+    movers = static.paddles + static.pucks + static.blocks
+    walls = len(static.walls)
+    size = movers * (movers + walls + len(static.obstacles))
+    floats = movers * (BODY + 3) + CONTACT * size + static.walls.size
+    return np.zeros((worlds, floats)), np.zeros((worlds, movers + 5 * size), np.int64)
+
+
+@compiled(nogil=True, error_model="numpy")
+def advance(
+    paddles: int,
+    pucks: int,
+    blocks: int,
+    radius: Array,
+    walls: Array,
+    wall_side: Array,
+    goal_lines: Array,
+    edges: int,
+    obstacles: Array,
+    control_dt: float,
+    coefficients: Array,
+    command: Array,
+    prescribed: Array,
+    closed: Array,
+    above: Array,
+    goal: Array,
+    imposed: Array,
+    raised: Array,
+    previous_position: Array,
+    previous_velocity: Array,
+    previous_angle: Array,
+    previous_spin: Array,
+    previous_touching: Array,
+    previous_time: Array,
+    position: Array,
+    velocity: Array,
+    angle: Array,
+    spin: Array,
+    time: Array,
+    touched: Array,
+    touched_at: Array,
+    touching: Array,
+    banked: Array,
+    crossed: Array,
+    crossed_velocity: Array,
+    lifted: Array,
+    path: Array,
+    against: Array,
+    out: Array,
+    pinned: Array,
+    keys: Array,
+    collisions: Array,
+    work: Array,
+    indices: Array,
+) -> None:
+    """Move B worlds by a control step, in place.
+
+    The arrays of a `Batch` are single arguments: numba is slow to unbox tuples of
+    arrays from Python, and Python to build them. ``command``, ``prescribed``,
+    ``closed`` and ``above`` are those of a `contracts.backend.Command`; the next three
+    are filled.
+    """
+    static = Static(
+        *(paddles, pucks, blocks, radius, walls, wall_side, goal_lines),
+        *(edges, obstacles, control_dt),
+    )
+    ways = command, prescribed, above, previous_position
+    follow(*ways, control_dt, goal, imposed, raised)
+    commands = Commands(goal, imposed, raised, closed)
+    previous = Previous(
+        *(previous_position, previous_velocity, previous_angle, previous_spin),
+        *(previous_touching, previous_time),
+    )
+    result = Result(
+        *(position, velocity, angle, spin, time, touched, touched_at, touching),
+        *(banked, crossed, crossed_velocity, lifted, path, against, out, pinned),
+    )
+    batch = Batch(static, coefficients, commands, previous, result, keys, collisions)
+    busy = np.empty(len(coefficients), np.bool_)
+    blocked = block_space(paddles + pucks + blocks)
+    if fly_freely(batch, busy, blocked):
+        advance_busy(batch, busy, work, indices)
+    for b in range(len(goal)):
+        for i in range(paddles):
+            if imposed[b, i]:
+                velocity[b, i, 0] = prescribed[b, i, 2]
+                velocity[b, i, 1] = prescribed[b, i, 3]

@@ -1,0 +1,231 @@
+"""Observables: parts of an observation, with bounds, labels and ego frames.
+
+Vectors are in the seat's ego frame, SI units.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.extrapolation import Walls, extrapolate
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.types import Array, Memory
+
+OBSERVE = ("velocity", "estimate", "history", "pixels")
+"""Forms of the puck in observations: position and velocity as they are sensed; the same
+estimated for now by a filter that knows the table; the last sensed positions, each with
+a visibility flag and the age of its frame, as a camera gives them; or pictures."""
+
+
+HISTORY = 5
+"""Number of sensed positions of a puck in a history."""
+PENDING = 2
+"""Number of the last actions that are shown, which may still be on their way."""
+FRAMES = 3
+"""Number of pictures on top of each other in pixels."""
+
+
+class Column(NamedTuple):
+    """Element of an observation.
+
+    ``(value - centre) / unit`` is of order one: the fixed scaling for a network.
+    """
+
+    label: str
+    low: float
+    high: float
+    unit: float
+    centre: float = 0.0
+
+
+@dataclass(frozen=True)
+class ObservationContext:
+    """Context that observables need to state their columns."""
+
+    scene: Scene
+    observe: str
+    top_speed: float
+    reaction: float = 0.0
+    """Time by which seats see pucks and other paddles late, s"""
+
+    @property
+    def extrapolates(self) -> bool:
+        """True if pucks are shown as they were and as they would be now."""
+        return self.reaction > 0.0 and self.observe != "history"
+
+    @cached_property
+    def extent(self) -> Array:
+        """(2,) largest |x| and |y| of the table in any seat's ego frame, m."""
+        corners = np.asarray(self.scene.table.vertices)
+        rotated = [corners @ r.T for r in self.rotations]
+        return np.asarray(np.max(np.abs(rotated), axis=(0, 1)))
+
+    @cached_property
+    def walls(self) -> Walls:
+        """Walls that pucks are brought forward by, table frame."""
+        return Walls.of(self.scene)
+
+    @cached_property
+    def rotations(self) -> Array:
+        """(S, 2, 2) from the table frame to each seat's ego frame."""
+        return np.array([self.scene.table.rotation(s.side) for s in self.scene.seats])
+
+    @cached_property
+    def straight(self) -> bool:
+        """True if there is one seat and its ego frame is the table frame."""
+        return len(self.rotations) == 1 and bool(self.rotations[0, 0, 0] == 1.0)
+
+    def position_columns(
+        self, name: str, unit: tuple[float, float], x: float = 0.0
+    ) -> list[Column]:
+        """Return the columns of a position, centred at (x, 0)."""
+        ex, ey = self.extent
+        return [
+            Column(f"{name}.x", -ex, ex, unit[0], x),
+            Column(f"{name}.y", -ey, ey, unit[1]),
+        ]
+
+    def offset_columns(self, name: str, unit: tuple[float, float]) -> list[Column]:
+        """Return the columns of the offset from one position to another."""
+        ex, ey = 2 * self.extent
+        return [
+            Column(f"{name}.dx", -ex, ex, unit[0]),
+            Column(f"{name}.dy", -ey, ey, unit[1]),
+        ]
+
+    def velocity_columns(self, name: str, most: float, unit: float) -> list[Column]:
+        """Return the columns of a velocity."""
+        return [Column(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
+
+
+class EgoView:
+    """View from every seat of what it sees, and of its own paddle.
+
+    With a reaction, state, memory and history are those of a moment in the past.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        memory: Memory,
+        history: Array,
+        requested: Array,
+        paddle: tuple[Array, Array],
+        scope: ObservationContext,
+    ) -> None:
+        self.state, self.memory, self.scope = state, memory, scope
+        self.history = history
+        """(..., HISTORY, pucks, 4) sensed x, y, visible, age (s), newest last"""
+        self.requested = requested
+        """(..., PENDING, S, 2) requested actions, ego frames, newest last"""
+        self.own, self.own_velocity = (self._own(x) for x in paddle)
+        """(..., S, 2) each seat's own paddle now, m and m/s"""
+        self.puck = self.rotate(state.puck)
+        """(..., S, pucks, 2) m"""
+        self.puck_velocity = self.rotate(state.puck_velocity)
+        """(..., S, pucks, 2) m/s"""
+        self.puck_edge = state.puck_edge[..., None, :]
+        """(..., 1, pucks) m/s, the same from every seat"""
+
+    def kept(self, name: str) -> Array:
+        """Return an array of the scenario's memory.
+
+        Raises:
+            ValueError: there is none of this name.
+        """
+        if name not in self.memory:
+            raise ValueError(unknown_name("memory", name, self.memory))
+        return self.memory[name]
+
+    def rotate(self, vectors: Array) -> Array:
+        """Rotate (..., n, 2) of the table frame to ego frames, (..., S, n, 2)."""
+        seats = vectors[..., None, :, :]
+        if self.scope.straight:
+            return seats
+        rotated: Array = seats @ self.scope.rotations.swapaxes(-1, -2)
+        return rotated
+
+    @property
+    def puck_predicted(self) -> tuple[Array, Array]:
+        """(..., S, pucks, 2) pucks, brought forward by the reaction if any, m and m/s.
+
+        See `extrapolation.extrapolate`; what paddles did in that time is not known.
+        """
+        if not self.scope.extrapolates:
+            return self.puck, self.puck_velocity
+        seen = self.state.puck, self.state.puck_velocity
+        now = extrapolate(*seen, self.scope.reaction, self.scope.walls)
+        return self.rotate(now[0]), self.rotate(now[1])
+
+    @property
+    def own_delayed(self) -> tuple[Array, Array]:
+        """(..., S, 2) each seat's own paddle at the moment that it sees, m and m/s."""
+        state = self.state
+        return self._own(state.paddle), self._own(state.paddle_velocity)
+
+    def _own(self, vectors: Array) -> Array:
+        if self.scope.straight:
+            return vectors
+        seats = np.arange(vectors.shape[-2])
+        own: Array = self.rotate(vectors)[..., seats, seats, :]
+        return own
+
+
+class Observable(ABC):
+    """Part of an observation."""
+
+    goal: bool = False
+    """True for the wanted goal, which goals="dict" shows apart."""
+
+    @abstractmethod
+    def columns(self, scope: ObservationContext) -> list[Column]:
+        """Return a column for each number."""
+
+    @abstractmethod
+    def write(self, ego: EgoView, out: Array) -> None:
+        """Put the numbers into ``out`` (..., S, columns)."""
+
+
+class ObservationLayout:
+    """Observables side by side: bounds, labels, and the numbers of an ego view."""
+
+    def __init__(
+        self, observables: tuple[Observable, ...], scope: ObservationContext
+    ) -> None:
+        self.scope = scope
+        columns = [observable.columns(scope) for observable in observables]
+        ends = np.cumsum([len(c) for c in columns]).tolist()
+        starts = [0, *ends[:-1]]
+        self._parts = [
+            (observable, slice(a, b))
+            for observable, a, b in zip(observables, starts, ends, strict=True)
+        ]
+        flat = [column for part in columns for column in part]
+        self.meanings = tuple(
+            (type(observable).__doc__ or "").partition("\n\n")[0]
+            for observable, part in zip(observables, columns, strict=True)
+            for _ in part
+        )
+        """What each column is of: the first sentence of its observable's docstring"""
+        self.labels = tuple(column.label for column in flat)
+        self.low = np.array([c.low for c in flat], np.float32)
+        self.high = np.array([c.high for c in flat], np.float32)
+        self.unit = np.array([c.unit for c in flat], np.float32)
+        self.centre = np.array([c.centre for c in flat], np.float32)
+
+    def read(self, ego: EgoView) -> Array:
+        """(..., S, columns) float32, inside the bounds."""
+        seats = len(self.scope.scene.seats)
+        shape = (*ego.state.time.shape, seats, len(self.labels))
+        out = np.empty_like(ego.state.position, shape=shape)
+        for observable, part in self._parts:
+            observable.write(ego, out[..., part])
+        inside = np.minimum(np.maximum(out, self.low), self.high)
+        return inside.astype(np.float32)

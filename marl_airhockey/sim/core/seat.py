@@ -1,0 +1,139 @@
+"""Seat: one paddle at a side of the table, its reach and its limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from marl_airhockey.sim.core.geometry import clip, half_planes
+from marl_airhockey.sim.core.table import Table
+from marl_airhockey.types import Array
+
+SEAT_KINDS: tuple[str, ...] = ("robot", "arcade")
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Seat of one paddle: its side, the region of its centre, and its speed limits."""
+
+    side: int
+    """Side of the table that it belongs to."""
+    reach: tuple[tuple[float, float], ...]
+    """Convex polygon around the paddle's centre; ego frame, counter-clockwise, m."""
+    speed: float
+    """Top speed (m/s)."""
+    acceleration: float
+    """Largest acceleration (m/s2)."""
+    team: int = 0
+
+
+def make_seat(
+    kind: str, table: Table, side: int, others: tuple[int, ...] = (), team: int = 0
+) -> Seat:
+    """Return a seat of a kind at a side of a table.
+
+    ``robot``: what a UR5e can hold with its base 0.22 m behind its side, the table's
+    `robot_reach`, as far as it lies in the side's territory.
+    ``arcade``: all of the territory, at what an arm of a person or a gantry reaches.
+    Centres keep a paddle's radius inside of it.
+
+    Args:
+        kind: "robot" or "arcade".
+        table: table of the seat.
+        side: index of its side.
+        others: sides that other seats own; a territory ends half-way to them.
+        team: the team that the seat plays for.
+    """
+    if kind not in SEAT_KINDS:
+        raise ValueError(f"seats: {kind!r} is unknown; there are {SEAT_KINDS}")
+    edge = -float(table.offsets[side])
+    ego = table.rotation(side).T
+    # From the own side on, so that the numbers of opposite seats are the same.
+    count = len(table.vertices)
+    order = [(side + k) % count for k in range(count)]
+    normals = table.normals @ ego
+    if kind == "robot":
+        polygon, speed, acceleration = np.array(table.robot_reach), 0.7, 7.0
+        polygon[:, 0] += edge
+    else:
+        polygon, speed, acceleration = np.array(table.vertices)[order] @ ego, 5.0, 50.0
+    for k in order:
+        polygon = clip(polygon, normals[k], table.offsets[k] - table.paddle_radius)
+    own = np.array([1.0, 0.0])
+    rivals = [other for other in order[1:] if other in others]
+    for other in rivals:
+        # Points nearer to the own side than to the other, less the paddle's radius.
+        toward, gap = normals[other] - own, table.offsets[other] - table.offsets[side]
+        length = np.linalg.norm(toward)
+        polygon = clip(polygon, toward / length, gap / length - table.paddle_radius)
+    if not rivals and kind == "arcade":
+        polygon = clip(polygon, -own, -table.paddle_radius)
+    reach = tuple((float(x), float(y)) for x, y in polygon)
+    return Seat(side, reach, speed, acceleration, team)
+
+
+@cache
+def reaches(table: Table, seats: tuple[Seat, ...]) -> tuple[Array, Array]:
+    """Return the edges of the reaches of S seats in the table frame.
+
+    Returns:
+        Inward unit normals (S, K, 2), zero where a seat has fewer edges, and offsets
+        (S, K) in metres, infinite there.
+    """
+    planes = [half_planes(seat.reach) for seat in seats]
+    edges = max(len(offset) for _, offset in planes)
+    normals = np.zeros((len(seats), edges, 2))
+    offsets = np.full((len(seats), edges), np.inf)
+    for s, (seat, (normal, offset)) in enumerate(zip(seats, planes, strict=True)):
+        normals[s, : len(offset)] = normal @ table.rotation(seat.side)
+        offsets[s, : len(offset)] = offset
+    return normals, offsets
+
+
+OBSTACLE_MARGIN = 1e-3
+"""Gap that paddles keep to obstacles; braking in a wedge takes up to half of it (m)."""
+OBSTACLE_SHARE = 0.5
+"""Share of the acceleration that may be planned against one of edges and obstacles."""
+
+
+@dataclass(frozen=True)
+class ReachPlanes:
+    """Reaches of S seats as half-planes of the table frame."""
+
+    normals: Array
+    """Inward unit normals (S, K, 2); zero where a seat has fewer edges"""
+    offsets: Array
+    """Offsets (S, K), m; infinite where a seat has fewer edges"""
+    share: Array
+    """Share of the acceleration that may be planned against one edge (S,), so that
+    braking against both edges of a corner together stays within the limit"""
+    rotation: Array
+    """Rotations from the table frame to each seat's ego frame (S, 2, 2)"""
+    obstacles: Array
+    """Obstacles (O, 5): both ends, m, and the distance that centres keep, m"""
+    passes: int
+    """Number of projections: more than one if any corner is sharper than 90 degrees, or
+    if there are obstacles"""
+
+    @staticmethod
+    def of(table: Table, seats: tuple[Seat, ...]) -> ReachPlanes:
+        """Return the half-planes of the seats of a table."""
+        normals, offsets = reaches(table, seats)
+        share, sharpest = np.ones(len(seats)), 1.0
+        for s, seat in enumerate(seats):
+            normal, _ = half_planes(seat.reach)
+            cosine = np.einsum("kd,kd->k", normal, np.roll(normal, -1, axis=0)).min()
+            share[s] = np.sqrt((1 + cosine) / 2)
+            sharpest = min(sharpest, cosine)
+        rotation = np.array([table.rotation(seat.side) for seat in seats])
+        near = table.paddle_radius + OBSTACLE_MARGIN
+        rows = [
+            (*o.start, *(o.end or o.start), o.radius + near) for o in table.obstacles
+        ]
+        obstacles = np.array(rows, float).reshape(-1, 5)
+        # Braking against an obstacle and an edge is planned as in a corner.
+        share = np.minimum(share, OBSTACLE_SHARE) if rows else share
+        passes = 1 if sharpest > -1e-9 and not rows else 12
+        return ReachPlanes(normals, offsets, share, rotation, obstacles, passes)

@@ -1,0 +1,144 @@
+"""Table: a convex polygon, its sides and their ego frames.
+
+Table frame: origin at the centroid; for a rectangle x runs along the length from the
+home end (side 0) to the far end, y to the left. The ego frame of a side is the table
+frame rotated so that the side's inward normal is +x.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from marl_airhockey.sim.core.geometry import _cross
+from marl_airhockey.sim.core.parameters import PRESETS
+from marl_airhockey.types import Array
+
+GRAVITY = 9.81
+"""Standard gravity (m/s2)."""
+
+
+BOX = (
+    *((0.0782, 0.25), (0.0782, -0.25), (0.4182, -0.25)),
+    *((0.4982, -0.15), (0.4982, 0.15), (0.4182, 0.25)),
+)
+"""What an arm needs on the standard table: a box with far corners cut at the slope of
+0.8 that the paper's authors use."""
+WIDE = (
+    *((0.0782, 0.36), (0.0782, -0.36), (0.42, -0.36), (0.47, -0.25), (0.51, -0.08)),
+    *((0.51, 0.08), (0.47, 0.25), (0.42, 0.36)),
+)
+"""All that a UR5e holds with its base 0.22 m behind the side: no joint is faster than
+0.9 pi rad/s at 0.7 m/s in any direction, flat or tilted, by inverse kinematics."""
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Obstacle: a static disc, or a rounded segment if ``end`` is given; metres."""
+
+    start: tuple[float, float]
+    radius: float
+    end: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Convex playing surface; `TABLES` holds presets.
+
+    Raises:
+        ValueError: a polygon that is not convex and counter-clockwise about the
+            origin, or a disc that does not fit on it.
+    """
+
+    vertices: tuple[tuple[float, float], ...]
+    """Corners (m), counter-clockwise; side k runs from corner k to k + 1."""
+    paddle_radius: float = 0.047625
+    """Radius of a paddle (m; 3.75 in diameter)."""
+    puck_radius: float = 0.03175
+    """Radius of a puck (m; 2.5 in diameter)."""
+    robot_reach: tuple[tuple[float, float], ...] = BOX
+    """Convex polygon that a UR5e at a side holds: x from the side, y, m."""
+    obstacles: tuple[Obstacle, ...] = ()
+    physics: dict[str, float] = field(default_factory=dict, hash=False)
+    """Physical parameters that come with this table, by name."""
+
+    def __post_init__(self) -> None:
+        corners = np.asarray(self.vertices, dtype=float)
+        if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2:
+            raise ValueError("table.vertices: at least three (x, y) corners are needed")
+        ahead = np.roll(corners, -1, axis=0) - corners
+        bend = _cross(ahead, np.roll(ahead, -1, axis=0))
+        if (bend <= 0).any():
+            raise ValueError("table.vertices: must be convex and counter-clockwise")
+        if (self.offsets <= 0).any():
+            raise ValueError("table.vertices: the origin must lie inside the table")
+        for name in ("paddle_radius", "puck_radius"):
+            radius = getattr(self, name)
+            if not 0 < radius < self.offsets.min():
+                raise ValueError(
+                    f"table.{name}: {radius} m does not fit on this table; it must be "
+                    f"above 0 and below {self.offsets.min():.3f} m"
+                )
+
+    @staticmethod
+    def rectangle(length: float, width: float, **physics: float) -> Table:
+        """Return a table of ``length`` x ``width`` m; side 0 is home, 2 the far end."""
+        x, y = length / 2, width / 2
+        return Table(((-x, y), (-x, -y), (x, -y), (x, y)), physics=physics)
+
+    @staticmethod
+    def regular(sides: int, inradius: float) -> Table:
+        """Return a regular polygon with sides ``inradius`` m from the centre."""
+        radius = inradius / np.cos(np.pi / sides)
+        angles = np.pi - np.pi / sides + 2 * np.pi * np.arange(sides) / sides
+        # Side 0 faces +x: it lies at x = -inradius, as home does on a rectangle.
+        corners = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
+        return Table(tuple((float(x), float(y)) for x, y in corners))
+
+    @cached_property
+    def normals(self) -> Array:
+        """Inward unit normals (sides, 2)."""
+        corners = np.asarray(self.vertices, dtype=float)
+        ahead = np.roll(corners, -1, axis=0) - corners
+        ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+        return np.stack([-ahead[:, 1], ahead[:, 0]], -1)
+
+    @cached_property
+    def offsets(self) -> Array:
+        """Distances of the sides from the origin (sides,), m."""
+        inward = (self.normals * np.asarray(self.vertices)).sum(-1)
+        return np.asarray(-inward)
+
+    @cached_property
+    def size(self) -> Array:
+        """Extent of the bounding box (2,), m."""
+        return np.asarray(np.ptp(np.asarray(self.vertices), axis=0))
+
+    def ends(self, side: int) -> tuple[Array, Array]:
+        """Return the two corners of a side, (2,) each, m."""
+        corners = np.asarray(self.vertices, dtype=float)
+        return corners[side], corners[(side + 1) % len(corners)]
+
+    def rotation(self, side: int) -> Array:
+        """Return the rotation (2, 2) from the table frame to the side's ego frame."""
+        c, s = self.normals[side]
+        return np.array([[c, s], [-s, c]])
+
+
+TABLES: dict[str, Table] = {
+    "standard": Table.rectangle(1.6764, 0.6096),
+    "full_size": replace(Table.rectangle(1.9304, 0.8636), robot_reach=WIDE),
+    "ubc_pro": replace(
+        Table.rectangle(2.362, 1.144), puck_radius=0.0413, paddle_radius=0.0505
+    ),
+    "ubc_wood": replace(
+        Table.rectangle(1.9885, 0.9905, **PRESETS["wooden"]),
+        puck_radius=0.03145,
+        paddle_radius=0.0501,
+    ),
+}
+"""Table presets: the 66 x 24 in workspace and the 76 x 34 in table of the paper, and
+the professional and the home-made wooden table whose play was measured, the last with
+its physics."""

@@ -1,0 +1,105 @@
+"""Anti-aliased canvas with coordinates in metres, by OpenCV."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from marl_airhockey.sim.core.table import Table
+from marl_airhockey.types import Array
+
+Colour = tuple[int, int, int]
+"""RGB, 0 to 255"""
+ROOM: Colour = (236, 239, 243)
+SMOOTH = 2
+"""Factor by which pictures are drawn larger, to be averaged down"""
+SHIFT = 6
+"""Fractional bits of OpenCV's fixed-point coordinates"""
+
+
+class Canvas:
+    """Canvas in metres (table frame): the table's bounding box and a margin.
+
+    Args:
+        table: the table.
+        width: width of the finished picture, pixels.
+        margin: space around the table, m.
+        bar: height of the title bar, pixels of the finished picture.
+    """
+
+    def __init__(self, table: Table, width: int, margin: float, bar: int) -> None:
+        corners = np.asarray(table.vertices)
+        self.low, high = corners.min(0) - margin, corners.max(0) + margin
+        self.scale = SMOOTH * width / float(high[0] - self.low[0])
+        self.bar = SMOOTH * bar
+        tall = round(float(high[1] - self.low[1]) * self.scale) + self.bar
+        # Even sizes: video codecs want them.
+        tall += -tall % (2 * SMOOTH)
+        self.image = np.full((tall, SMOOTH * width, 3), ROOM, np.uint8)
+        self.bottom = tall
+
+    def pixel(self, point: Sequence[float] | Array) -> tuple[int, int]:
+        """Return the fixed-point pixel of a point (2,) m."""
+        x = (float(point[0]) - self.low[0]) * self.scale
+        y = self.bottom - (float(point[1]) - self.low[1]) * self.scale
+        return round(x * 2**SHIFT), round(y * 2**SHIFT)
+
+    def disc(
+        self, centre: Sequence[float] | Array, radius: float, colour: Colour
+    ) -> None:
+        """Draw a filled disc; centre and radius in m."""
+        size = max(round(radius * self.scale * 2**SHIFT), 1)
+        cv2.circle(self.image, self.pixel(centre), size, colour, -1, cv2.LINE_AA, SHIFT)
+
+    def ring(
+        self,
+        centre: Sequence[float] | Array,
+        radius: float,
+        colour: Colour,
+        width: float = 1.5,
+    ) -> None:
+        """Draw a circle (m) with a line ``width`` pixels wide."""
+        size = max(round(radius * self.scale * 2**SHIFT), 1)
+        line = max(round(width * SMOOTH), 1)
+        cv2.circle(
+            self.image, self.pixel(centre), size, colour, line, cv2.LINE_AA, SHIFT
+        )
+
+    def line(
+        self,
+        start: Sequence[float] | Array,
+        end: Sequence[float] | Array,
+        colour: Colour,
+        width: float = 1.5,
+    ) -> None:
+        """Draw a straight line (m), ``width`` pixels wide."""
+        wide = max(round(width * SMOOTH), 1)
+        a, b = self.pixel(start), self.pixel(end)
+        cv2.line(self.image, a, b, colour, wide, cv2.LINE_AA, SHIFT)
+
+    def polygon(self, corners: Array, colour: Colour, width: float = 0.0) -> None:
+        """Fill a polygon (K, 2) m, or with ``width`` (pixels) draw its outline."""
+        points = np.array([self.pixel(c) for c in corners], np.int32)
+        if width:
+            wide = max(round(width * SMOOTH), 1)
+            cv2.polylines(self.image, [points], True, colour, wide, cv2.LINE_AA, SHIFT)
+        else:
+            cv2.fillPoly(self.image, [points], colour, cv2.LINE_AA, SHIFT)
+
+    def text(
+        self, words: str, x: int, size: float, colour: Colour, right: bool
+    ) -> None:
+        """Write words in the title bar, ``x`` pixels from its left or right end."""
+        font, thick = cv2.FONT_HERSHEY_DUPLEX, SMOOTH
+        scale = size * SMOOTH
+        (wide, high), _ = cv2.getTextSize(words, font, scale, thick)
+        left = self.image.shape[1] - x * SMOOTH - wide if right else x * SMOOTH
+        corner = (left, (self.bar + high) // 2)
+        cv2.putText(self.image, words, corner, font, scale, colour, thick, cv2.LINE_AA)
+
+    def finish(self) -> Array:
+        """Return the finished picture (H, W, 3) uint8 RGB, freshly allocated."""
+        size = (self.image.shape[1] // SMOOTH, self.image.shape[0] // SMOOTH)
+        return np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA))

@@ -1,0 +1,217 @@
+"""Pictures of the 2D table from above: anti-aliased, home on the left.
+
+`draw` makes a picture of a `Frame`: the source of what environments render, of the
+docs' pictures and of videos.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from marl_airhockey.sim.contracts.mark import Mark, Meaning
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.render.canvas import SMOOTH, Canvas, Colour
+from marl_airhockey.types import Array
+
+SEAT_COLOURS: tuple[Colour, ...] = (
+    (0, 114, 178),
+    (213, 94, 0),
+    (0, 158, 115),
+    (204, 121, 167),
+    (86, 180, 233),
+    (230, 159, 0),
+)
+"""RGB colours of seats: Okabe and Ito's palette, safe for colour-blind people"""
+RAIL, FIELD = (52, 62, 76), (250, 251, 253)
+PRINT, FAINT, INK = (168, 196, 224), (214, 226, 238), (34, 40, 49)
+PUCK, PUCK_RIM, BLOCK, BLOCK_RIM = (
+    (46, 52, 64),
+    (20, 24, 31),
+    (222, 184, 112),
+    (150, 112, 50),
+)
+GOAL = (200, 60, 90)
+CIRCLES: dict[Meaning, Colour] = {
+    "goal": GOAL,
+    "reward": (170, 125, 10),
+    "cost": (213, 94, 0),
+    "drag": (105, 116, 134),
+}
+"""Colours of circles by what they mean"""
+SIGNS: dict[Meaning, list[tuple[float, float, float, float]]] = {
+    "reward": [(-1, 0, 1, 0), (0, -1, 0, 1)],
+    "cost": [(-1, 0, 1, 0)],
+    "drag": [(-1, -0.5, 1, -0.5), (-1, 0.5, 1, 0.5)],
+}
+"""Lines of a sign in the middle of a region, in quarters of its radius"""
+WIDTH = 880
+"""Width of a picture unless another is given, pixels"""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Contents of a picture of one world."""
+
+    scene: Scene
+    state: State
+    """State without leading axes"""
+    marks: Sequence[Mark] = ()
+    trails: Sequence[Sequence[tuple[float, float]]] = ()
+    """Recent positions of each puck, oldest first, m"""
+    title: str = ""
+    note: str = ""
+    """Text at the right of the title bar, say the score"""
+    clock: float = 0.0
+    """Share of the episode that is over, 0 to 1"""
+    success: bool = False
+    eliminated: Sequence[bool] = ()
+    """Flags of the seats that are out of the game; empty if seats cannot retire"""
+
+
+def draw(frame: Frame, width: int = WIDTH) -> Array:
+    """Draw a picture (H, W, 3) uint8 RGB, ``width`` pixels wide."""
+    canvas = Canvas(frame.scene.table, width, margin=0.075, bar=44)
+    _table(canvas, frame)
+    for mark in frame.marks:
+        _mark(canvas, mark)
+    for trail in frame.trails:
+        _trail(canvas, trail, frame.scene.table.puck_radius)
+    _bodies(canvas, frame.scene, frame.state)
+    for mark in frame.marks:
+        # A goal that a paddle can hide is drawn over it.
+        goal = mark.kind == "circle" and mark.means == "goal"
+        if goal and mark.radius < frame.scene.table.paddle_radius:
+            canvas.ring(mark.start, mark.radius, GOAL, 2)
+    _bar(canvas, frame)
+    return canvas.finish()
+
+
+def _table(canvas: Canvas, frame: Frame) -> None:
+    scene, table = frame.scene, frame.scene.table
+    corners, sides = np.asarray(table.vertices), [seat.side for seat in scene.seats]
+    grown = corners * (1 + 0.04 / table.offsets.min())
+    box = np.abs(corners) + 0.04
+    if len(corners) == 4:
+        grown = np.sign(corners) * box
+    canvas.polygon(grown, RAIL)
+    canvas.polygon(corners, FIELD)
+    half = table.size[1] / 2
+    canvas.ring((0, 0), 0.16, FAINT, 2)
+    if len(corners) == 4 and len(set(sides)) <= 2:
+        canvas.line((0, -half), (0, half), PRINT, 2)
+        for x in (-table.size[0] / 4, table.size[0] / 4):
+            canvas.line((x, -half), (x, half), FAINT, 1)
+    canvas.disc((0, 0), 0.012, PRINT)
+    for i, seat in enumerate(scene.seats):
+        reach = np.asarray(seat.reach) @ table.rotation(seat.side)
+        canvas.polygon(reach, _pale(_seat_colour(scene, i), 0.86), 1)
+    for goal_line in scene.goal_lines:
+        owner = sides.index(goal_line.side) if goal_line.side in sides else 0
+        if goal_line.width is None or (
+            any(frame.eliminated) and frame.eliminated[owner]
+        ):
+            continue
+        near, out = scene.opening(goal_line), -0.04 * table.normals[goal_line.side]
+        gap = np.array([*near, *(near + out)[::-1]])
+        canvas.polygon(gap, _pale(_seat_colour(scene, owner), 0.55))
+
+
+def _mark(canvas: Canvas, mark: Mark) -> None:
+    if mark.kind == "circle":
+        colour, (x, y), unit = CIRCLES[mark.means], mark.start, 0.25 * mark.radius
+        canvas.disc(mark.start, mark.radius, _pale(colour, 0.82))
+        canvas.ring(mark.start, mark.radius, colour, 2)
+        for ax, ay, bx, by in SIGNS.get(mark.means, []):
+            ends = (x + unit * ax, y + unit * ay), (x + unit * bx, y + unit * by)
+            canvas.line(*ends, _pale(colour, 0.4), 2)
+        return
+    canvas.line(mark.start, mark.end, GOAL if mark.kind == "arrow" else PRINT, 2)
+    if mark.kind == "arrow":
+        tip, offset = np.asarray(mark.end), np.subtract(mark.end, mark.start)
+        length = float(np.hypot(*offset))
+        if length > 1e-6:
+            along = offset / length * 0.03
+            across = np.array([-offset[1], offset[0]]) / length * 0.014
+            base = tip - along
+            head = np.array([tip + along * 0.4, base + across, base - across])
+            canvas.polygon(head, GOAL)
+
+
+def _trail(canvas: Canvas, trail: Sequence[tuple[float, float]], radius: float) -> None:
+    for i, (a, b) in enumerate(pairwise(trail)):
+        age = (i + 1) / len(trail)
+        if np.hypot(b[0] - a[0], b[1] - a[1]) < 0.4:
+            wide = age * radius * canvas.scale / SMOOTH
+            canvas.line(a, b, _pale(PUCK, 1 - 0.3 * age), wide)
+
+
+def _bodies(canvas: Canvas, scene: Scene, state: State) -> None:
+    bodies, position = scene.bodies, state.position
+    radius, thin = bodies.radius, 1.5
+    for obstacle in scene.obstacles:
+        end = obstacle.end or obstacle.start
+        wide = 2 * obstacle.radius * canvas.scale / SMOOTH
+        canvas.line(obstacle.start, end, RAIL, wide)
+        canvas.disc(obstacle.start, obstacle.radius, RAIL)
+        canvas.disc(end, obstacle.radius, RAIL)
+    for k in range(bodies.block.start, bodies.block.stop):
+        if scene.block_shape == "disc":
+            canvas.disc(position[k], radius[k], BLOCK)
+            canvas.ring(position[k], radius[k], BLOCK_RIM, thin)
+        else:
+            c, s = np.cos(state.angle[k]), np.sin(state.angle[k])
+            square = radius[k] * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+            corners = position[k] + square @ np.array([[c, s], [-s, c]])
+            canvas.polygon(corners, BLOCK)
+            canvas.polygon(corners, BLOCK_RIM, thin)
+    for k in range(bodies.paddles):
+        colour = _seat_colour(scene, k)
+        canvas.disc(position[k], radius[k], colour)
+        canvas.ring(position[k], radius[k] * 0.97, _dark(colour), thin)
+        canvas.disc(position[k], radius[k] * 0.52, _pale(colour, 0.25))
+        canvas.ring(position[k], radius[k] * 0.52, _dark(colour), 1)
+    for k in range(bodies.puck.start, bodies.puck.stop):
+        canvas.disc(position[k], radius[k], PUCK)
+        canvas.ring(position[k], radius[k] * 0.96, PUCK_RIM, 1)
+        canvas.ring(position[k], radius[k] * 0.55, _pale(PUCK, 0.35), thin)
+        # A stripe shows how it spins.
+        angle = float(state.angle[k])
+        arm = 0.55 * radius[k] * np.array([np.cos(angle), np.sin(angle)])
+        canvas.line(position[k] - arm, position[k] + arm, _pale(PUCK, 0.35), thin)
+
+
+def _bar(canvas: Canvas, frame: Frame) -> None:
+    width = canvas.image.shape[1]
+    canvas.image[: canvas.bar] = FIELD
+    canvas.text(frame.title, 22, 0.55, INK, right=False)
+    note = frame.note + ("   success" if frame.success else "")
+    canvas.text(note, 22, 0.5, (0, 130, 95) if frame.success else INK, right=True)
+    done = round(width * min(max(frame.clock, 0.0), 1.0))
+    strip = slice(canvas.bar - 3 * SMOOTH, canvas.bar)
+    canvas.image[strip] = FAINT
+    canvas.image[strip, :done] = SEAT_COLOURS[0]
+
+
+def _seat_colour(scene: Scene, seat: int) -> Colour:
+    """Return a colour of the seat's own, or the team's, paler for later mates."""
+    teams = [s.team for s in scene.seats]
+    if len(set(teams)) in (1, len(teams)):
+        return SEAT_COLOURS[seat % len(SEAT_COLOURS)]
+    mates = [i for i, team in enumerate(teams) if team == teams[seat]]
+    colour = SEAT_COLOURS[teams[seat] % len(SEAT_COLOURS)]
+    return _pale(colour, 0.4 * mates.index(seat) / (len(mates) - 1))
+
+
+def _pale(colour: Colour, share: float) -> Colour:
+    r, g, b = (round(c + (255 - c) * share) for c in colour)
+    return r, g, b
+
+
+def _dark(colour: Colour) -> Colour:
+    r, g, b = (round(c * 0.62) for c in colour)
+    return r, g, b

@@ -1,0 +1,166 @@
+"""Sensor: the sensed states of B worlds and their history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.sim.contracts.observable import FRAMES, HISTORY, PENDING
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.rng import StreamSet
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.sensing.simulated_camera import SENSED, SimulatedCamera
+from marl_airhockey.types import ALL, Array, Rows
+
+
+class Needs(NamedTuple):
+    """Requirements of some forms of observations beyond the sensed state."""
+
+    history: bool
+    """The last sensed positions and requested actions."""
+    estimate: bool
+    """Estimates of the pucks for now, by a filter."""
+
+    @staticmethod
+    def of(forms: Iterable[str]) -> Needs:
+        """Return the requirements of forms of observations, see `observable.OBSERVE`.
+
+        Args:
+            forms: Names of the forms.
+        """
+        forms = set(forms)
+        return Needs(bool(forms - {"velocity"}), "estimate" in forms)
+
+
+class Sensor:
+    """Sensor of B worlds, which turns states into sensed states and keeps a history.
+
+    Args:
+        scene: Scene on the tables.
+        num_worlds: Number of worlds, B.
+        physics: Ranges of the parameters of sensing.
+        control_dt: Time of a step, s.
+        needs: Requirements of the observations.
+        sight: Newest measurement of a backend that senses itself, see
+            `Backend.sight`; None for a simulated camera.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        num_worlds: int,
+        physics: Physics,
+        control_dt: float,
+        needs: Needs,
+        sight: Callable[[], Array] | None = None,
+    ) -> None:
+        self.control_dt, self._sight, self._keeps = control_dt, sight, needs.history
+        self.camera: SimulatedCamera | None = None
+        """Simulated camera; None if the states themselves are observed."""
+        if sight is None and physics.any_of(*SENSED):
+            simulated = scene, num_worlds, physics, control_dt, needs.estimate
+            self.camera = SimulatedCamera(*simulated)
+        pucks, b = scene.bodies.pucks, num_worlds
+        self.history = np.zeros((b, HISTORY, pucks, 4))
+        """(B, HISTORY, pucks, 4) sensed x, y, m, visibility and age, s, newest last."""
+        self.age = np.zeros((b, pucks))
+        """(B, pucks) age of the simulated camera's newest frame of each puck, s."""
+        self.frames = np.zeros((b, FRAMES, len(scene.bodies), 2))
+        """(B, FRAMES, N, 2) sensed positions of all bodies, m, newest last."""
+        self.requested = np.zeros((b, PENDING, scene.bodies.paddles, 2))
+        """(B, PENDING, seats, 2) last requested actions, ego frames, newest last."""
+
+    @property
+    def ideal(self) -> bool:
+        """True if sensed states are equal to the states."""
+        return self.camera is None
+
+    def past(self) -> dict[str, Array]:
+        """Return ``history`` and ``requested``, by name."""
+        return {"history": self.history, "requested": self.requested}
+
+    def estimated(self, sensed: State) -> State:
+        """Return a sensed state with the estimates of the pucks for now."""
+        return sensed if self.camera is None else self.camera.estimated(sensed)
+
+    def best(self, sensed: State) -> State:
+        """Return a sensed state with estimates, if there are any."""
+        estimates = self.camera is not None and self.camera.estimates
+        return self.estimated(sensed) if estimates else sensed
+
+    def note(self, actions: Array) -> None:
+        """Append the actions (B, seats, 2) that are requested in a step."""
+        if self._keeps:
+            past = self.requested
+            past[:, :-1], past[:, -1] = past[:, 1:], actions
+
+    def begin(
+        self,
+        worlds: Array,
+        state: State,
+        values: Mapping[str, Array],
+        streams: StreamSet,
+    ) -> State:
+        """Begin an episode in some worlds; return the sensed state, see `reset`."""
+        self.requested[worlds] = 0.0
+        if self.camera is not None:
+            self.camera.begin(worlds, values, streams)
+        return self.reset(worlds, state, values, streams)
+
+    def reset(
+        self,
+        worlds: Array,
+        state: State,
+        values: Mapping[str, Array],
+        streams: StreamSet,
+    ) -> State:
+        """Forget the past in some worlds; return the sensed state.
+
+        The past becomes that of bodies that have moved at their velocities.
+
+        Args:
+            worlds: Indices (W,) of the worlds.
+            state: State of all B worlds.
+            values: Physical parameters by name, (B,) each.
+            streams: Streams of the worlds, "sensor" among them.
+        """
+        if self.camera is not None:
+            self.camera.reset(worlds, state, values)
+        sensed = self.sense(state, values, streams, worlds)
+        if self._keeps:
+            self.history[worlds] = self.history[worlds][:, -1:]
+            self.frames[worlds] = self.frames[worlds][:, -1:]
+        return sensed
+
+    def sense(
+        self,
+        state: State,
+        values: Mapping[str, Array],
+        streams: StreamSet,
+        rows: Rows = ALL,
+    ) -> State:
+        """Return the sensed state; time has passed in the worlds ``rows`` alone."""
+        sensed = state
+        if self.camera is not None:
+            sensed, self.age = self.camera.look(state, values, streams, rows)
+        if self._keeps:
+            self._append(self.history, self._newest(sensed), rows)
+            self._append(self.frames, sensed.position, rows)
+        return sensed
+
+    def _newest(self, sensed: State) -> Array:
+        """Return the newest row (B, pucks, 4) of the history."""
+        if self._sight is not None:
+            return self._sight()
+        newest = np.empty((*self.age.shape, 4))
+        newest[..., :2], newest[..., 2] = sensed.puck, sensed.visible
+        newest[..., 3] = self.age
+        return newest
+
+    @staticmethod
+    def _append(past: Array, newest: Array, rows: Rows) -> None:
+        """Append a row (B, ...) to a past (B, n, ...) in some worlds, in place."""
+        past[rows, :-1], past[rows, -1] = past[rows, 1:], newest[rows]

@@ -1,0 +1,158 @@
+"""Actions of all seats in a step: open, driven and eliminated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from marl_airhockey.sim.contracts.backend import Command
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.sensing.delay import Delay
+from marl_airhockey.sim.world.driven_seat import DrivenSeat
+from marl_airhockey.sim.world.known import Known
+from marl_airhockey.types import Array
+
+
+class Inputs(NamedTuple):
+    """Inputs of a control step; preallocated arrays, overwritten at every step."""
+
+    action: Array
+    """(B, seats, 2) actions after their delay: fractions of top speed, ego frames"""
+    prescribed: Array
+    """(B, seats, 4) position, m, and velocity, m/s, of position-driven paddles, table
+    frame; nan for all others"""
+    closed: Array
+    """(B, goal_lines) bool: goal lines that are wall"""
+    raised: Array
+    """(B, seats) bool: paddles that are held above the table and touch nothing"""
+
+    @staticmethod
+    def empty(scene: Scene, worlds: int) -> Inputs:
+        """Return inputs of paddles at rest, freshly allocated."""
+        still = Command.still(scene, worlds)
+        action = np.zeros((worlds, len(scene.seats), 2))
+        return Inputs(action, still.prescribed, still.closed, still.raised)
+
+
+class Actions:
+    """Collector of the actions of B worlds, which delays them by the physics.
+
+    Args:
+        scenario: Scenario, which says which seats are eliminated.
+        driven: Seats with drivers inside the environment.
+        open_seats: Indices (open,) of the other seats.
+        physics: Ranges of the action latency.
+        worlds: Number of worlds, B.
+        control_dt: Time of a step, s.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        driven: Sequence[DrivenSeat],
+        open_seats: Array,
+        physics: Physics,
+        worlds: int,
+        control_dt: float,
+    ) -> None:
+        scene, longest = scenario.scene, physics.highest("action_delay")
+        self._scenario, self._driven, self._open = scenario, driven, open_seats
+        self._rotations = [scene.table.rotation(seat.side) for seat in scene.seats]
+        self._elimination = _Elimination(scene)
+        self._shape = (worlds, len(open_seats), 2)
+        self.inputs = Inputs.empty(scene, worlds)
+        """Inputs of the step, as `collect` leaves them."""
+        shape = self.inputs.action.shape
+        self._delay = Delay(longest, control_dt, shape) if longest else None
+        self._positioned = False
+        """True if the last step had position-driven paddles or closed goals."""
+
+    def reset(self, worlds: Array) -> None:
+        """Forget the actions that are under way in some worlds, by index."""
+        if self._delay is not None:
+            self._delay.fill(worlds, 0.0)
+
+    def collect(self, actions: Array, prescribed: Array | None, known: Known) -> Array:
+        """Fill `inputs`; return the requested actions (B, seats, 2), before any delay.
+
+        Args:
+            actions: Actions (B, open, 2) of the open seats.
+            prescribed: Positions and velocities (B, open, 4) of paddles of open seats,
+                nan for those that request an action; None if all do.
+            known: What seats know before the step.
+
+        Raises:
+            ValueError: A wrong shape, or a paddle prescribed at infinity.
+        """
+        if prescribed is not None and np.isinf(prescribed).any():
+            raise ValueError("prescribed: no element may be infinite")
+        if actions.shape != self._shape:
+            raise ValueError(
+                f"actions: expected shape {self._shape}, got {actions.shape}"
+            )
+        inputs, requested = self.inputs, self.inputs.action
+        if self._positioned:
+            inputs.prescribed[:], inputs.closed[:] = np.nan, False
+            inputs.raised[:] = self._positioned = False
+        if not self._driven:
+            requested[:] = actions
+        else:
+            requested[:, self._open] = actions
+        if prescribed is not None:
+            for k, measured in zip(self._open, prescribed.swapaxes(0, 1), strict=True):
+                self._position(int(k), measured)
+        for seat in self._driven:
+            k, acts = seat.index, seat.acts
+            if acts:
+                requested[:, k] = seat.act(known)
+            measured = seat.measured()
+            if measured is not None:
+                self._position(k, measured, acts)
+        eliminated = self._scenario.eliminated(known.memory)
+        if eliminated is not None and eliminated.any():
+            self._elimination.apply(eliminated, inputs)
+            self._positioned = True
+        if self._delay is None:
+            return requested
+        requested = requested.copy()
+        delay = known.physics["action_delay"]
+        inputs.action[:] = self._delay.push(requested, delay)
+        return requested
+
+    def _position(self, k: int, measured: Array, acts: bool = False) -> None:
+        """Put a seat's paddle where it was measured, (B, 4), ego frame.
+
+        Worlds whose row is nan keep the requested action; in all others it is 0, unless
+        the driver has commanded its device with it: ``acts``.
+        """
+        self._positioned = True
+        action, prescribed = self.inputs.action, self.inputs.prescribed
+        if not acts:
+            given = np.isfinite(measured[:, :1])
+            action[:, k] = np.where(given, 0.0, action[:, k])
+        prescribed[:, k, :2] = measured[:, :2] @ self._rotations[k]
+        prescribed[:, k, 2:] = measured[:, 2:] @ self._rotations[k]
+
+
+class _Elimination:
+    """Positions of eliminated paddles, behind their sides, and their goal lines."""
+
+    def __init__(self, scene: Scene) -> None:
+        table, sides = scene.table, [seat.side for seat in scene.seats]
+        behind = table.offsets[sides] + 2 * table.paddle_radius
+        self._parking = np.zeros((len(sides), 4))
+        self._parking[:, :2] = -table.normals[sides] * behind[:, None]
+        lines = [line.side for line in scene.goal_lines]
+        owners = [sides.index(side) if side in sides else -1 for side in lines]
+        self._owner = np.array(owners, np.int64)
+
+    def apply(self, eliminated: Array, inputs: Inputs) -> None:
+        """Remove the paddles of eliminated seats (B, seats) and close their goals."""
+        inputs.action[eliminated], inputs.raised[eliminated] = 0.0, True
+        parking = np.broadcast_to(self._parking, inputs.prescribed.shape)
+        inputs.prescribed[eliminated] = parking[eliminated]
+        inputs.closed[:] = eliminated[:, self._owner] & (self._owner >= 0)

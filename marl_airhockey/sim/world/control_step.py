@@ -1,0 +1,204 @@
+"""Control step: limits, servo, physics, rules and observation as one pipeline.
+
+All stages work on preallocated arrays, which are overwritten in place.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from marl_airhockey.sim.contracts.backend import Backend, Command
+from marl_airhockey.sim.core.limits import INFINITE, Limited, limits_stage
+from marl_airhockey.sim.core.rows import clear_rows
+from marl_airhockey.sim.core.seat import ReachPlanes
+from marl_airhockey.sim.core.servo import servo_stage
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.jit.fused import Sink
+from marl_airhockey.sim.jit.pipeline import Pipeline, Stage
+from marl_airhockey.sim.world.actions import Inputs
+from marl_airhockey.sim.world.episode import EpisodeCounters
+from marl_airhockey.sim.world.observer import Observer
+from marl_airhockey.sim.world.referee import Referee, Step, Verdict
+from marl_airhockey.types import Array, Memory
+
+
+class Moment(NamedTuple):
+    """State of B worlds and of their episodes, and the step that led to it."""
+
+    state: State
+    commanded: Limited
+    """Commands that the limits passed, and by how much the actions exceeded them"""
+    realized: Limited
+    """Commands that the paddles follow: the same, or a servo's response to them"""
+    rate: Array
+    """Acceleration of the servos (B, S, 2), m/s2"""
+    verdict: Verdict
+    episode: EpisodeCounters
+    """Counters, those of the verdict among them"""
+    shown: Sink
+    """Observations of all seats from the true state, see `Observer.stage`"""
+
+    def write(self, worlds: Array, rows: State, memory: Memory) -> None:
+        """Copy rows of a state and a memory into some worlds, by index."""
+        self.state.write(worlds, rows)
+        for name, row in memory.items():
+            self.verdict.memory[name][worlds] = row
+
+    def begin(self, worlds: Array) -> None:
+        """Reset the counters in some worlds, by index; paddles accelerate from 0."""
+        counts = (*self.episode.running, self.realized.acceleration)
+        clear_rows(worlds, tuple(x.reshape(len(x), -1) for x in counts))
+        self.commanded.velocity[worlds] = self.state.paddle_velocity[worlds]
+        self.commanded.acceleration[worlds] = self.rate[worlds] = 0.0
+
+
+class ControlStep:
+    """Control step of B worlds, from actions to rewards.
+
+    There are two moments, before and after, which swap roles at every step: what one
+    holds is overwritten by the step after the next. Rules and observations are compiled
+    when it is built. Copies and pickles hold the arrays and compile nothing again.
+
+    Args:
+        inputs: Inputs of every step, used by reference.
+        backend: Physics.
+        referee: Rules.
+        observer: Observations.
+        reach: Reach of the seats.
+        limit: Control steps (B,) after which the clock ends an episode.
+        episode: Counters of all worlds, used by reference.
+        state: State of all worlds at the beginning.
+        memory: Memory of all worlds at the beginning.
+        lags: Whether paddles follow their commands as a servo does.
+
+    Raises:
+        ValueError: A memory whose arrays change their type or shape in a step, named.
+    """
+
+    def __init__(
+        self,
+        inputs: Inputs,
+        backend: Backend,
+        referee: Referee,
+        observer: Observer,
+        reach: ReachPlanes,
+        limit: Array,
+        episode: EpisodeCounters,
+        state: State,
+        memory: Memory,
+        lags: bool = False,
+    ) -> None:
+        self._inputs, self._backend, self._referee = inputs, backend, referee
+        self._observer, self._reach, self._limit = observer, reach, limit
+        self._name, self._lags = referee.scenario.name, lags
+        self._response = np.zeros_like(inputs.action)
+        """(B, seats, 2) responses of the servos to the commands, as actions"""
+        self._moments = tuple(self._moment(state, memory, episode) for _ in range(2))
+        self._now = 0
+        self._pipelines: list[Pipeline] = []
+        self._compile()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_pipelines": []}
+
+    @property
+    def now(self) -> Moment:
+        """Moment at which the worlds are."""
+        return self._moments[self._now]
+
+    def __call__(self) -> Moment:
+        """Move all worlds by a step and return the moment after it.
+
+        Raises:
+            ValueError: an action that is not finite.
+        """
+        if not self._pipelines:
+            self._compile()
+        if not self._pipelines[self._now]():
+            raise ValueError(INFINITE)
+        self._now = 1 - self._now
+        return self._moments[self._now]
+
+    def _moment(self, state: State, memory: Memory, episode: EpisodeCounters) -> Moment:
+        """Return a moment with arrays of its own, filled as by a step of no time."""
+        here, b = self._backend.empty_state(), len(self._limit)
+        here.write(np.arange(b), state)
+        realized = Limited.empty(b, len(self._reach.share))
+        commanded = realized
+        if self._lags:
+            commanded = Limited.empty(b, len(self._reach.share))
+        step = Step(here, realized.velocity, here, memory, episode, self._limit)
+        verdict = self._referee.prepare(step)
+        _check_memory(memory, verdict.memory)
+        counted = episode.counted(verdict.counters)
+        rate = np.zeros_like(realized.velocity)
+        shown = self._observer.prepare(here, verdict.memory)
+        return Moment(here, commanded, realized, rate, verdict, counted, shown)
+
+    def _compile(self) -> None:
+        first, second = self._moments
+        pairs = (first, second), (second, first)
+        self._pipelines = [self._pipeline(*pair) for pair in pairs]
+
+    def _limits(self, before: Moment, after: Moment) -> list[Stage]:
+        """Return the stages from actions to the commands that paddles follow."""
+        state, physics = before.state, before.episode.physics
+        action, prescribed = self._inputs.action, self._inputs.prescribed
+        top, reach = physics["paddle_speed"], self._reach
+        shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
+        # Measured velocities come late: there the last command is taken instead.
+        last = state.velocity
+        if self._backend.senses_itself:
+            last = before.realized.velocity
+        moved = state.position, last, before.realized.acceleration
+        if not self._lags:
+            return [limits_stage(action, prescribed, moved, *shared, after.realized)]
+        old, new = before.commanded, after.commanded
+        commanded = state.position, old.velocity, old.acceleration
+        servo = servo_stage(
+            (old.velocity, new.velocity),
+            state.velocity,
+            (before.rate, after.rate),
+            physics["servo_time"],
+            top,
+            reach,
+            self._backend.control_dt,
+            self._response,
+        )
+        # Twice, as what lags must stay within the reach as well.
+        return [
+            limits_stage(action, prescribed, commanded, *shared, new),
+            servo,
+            limits_stage(self._response, prescribed, moved, *shared, after.realized),
+        ]
+
+    def _pipeline(self, before: Moment, after: Moment) -> Pipeline:
+        state, velocity = before.state, after.realized.velocity
+        command = Command(velocity, *self._inputs[1:])
+        step = Step(
+            *(state, velocity, after.state, before.verdict.memory),
+            *(before.episode, self._limit),
+        )
+        stages = [
+            *self._limits(before, after),
+            self._backend.stage(command, state, after.state),
+            self._referee.stage(step, after.verdict),
+            *self._observer.stage(after.state, after.verdict.memory, after.shown),
+        ]
+        return Pipeline(len(self._limit), stages, self._name)
+
+
+def _check_memory(old: Memory, new: Memory) -> None:
+    """Refuse a memory that is not of the same kind after a step."""
+    for name in old.keys() | new.keys():
+        kinds = [
+            f"{m[name].dtype} {m[name].shape}" if name in m else "nothing"
+            for m in (old, new)
+        ]
+        if kinds[0] != kinds[1]:
+            raise ValueError(
+                f"memory {name!r}: it begins as {kinds[0]} and is {kinds[1]} after a "
+                "step; let `initial_memory` give what `update_memory` gives"
+            )

@@ -1,0 +1,300 @@
+"""Observer: observations of all seats, as arrays, dicts of goals, or pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from marl_airhockey.sim.contracts.observable import (
+    FRAMES,
+    OBSERVE,
+    EgoView,
+    ObservationContext,
+    ObservationLayout,
+)
+from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario
+from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.jit.fused import Fused, Sink, Source
+from marl_airhockey.sim.jit.pipeline import Stage
+from marl_airhockey.sim.sensing.reaction import Parts, ReactionDelay
+from marl_airhockey.sim.sensing.sensor import Sensor
+from marl_airhockey.types import ALL, Array, Memory, Rows
+
+Observation = Array | Mapping[str, Array]
+"""(B, seats, D) float32, (B, seats, 84, 84, 3) uint8, or a dict of goals."""
+PIXELS = 84
+GOALS = ("achieved_goal", "desired_goal")
+
+
+class Observer:
+    """Observer of sensed states, for all seats and in several forms.
+
+    An observation is made in one of two ways: `stage` fills arrays from the true state
+    as part of the control step, where that is all that seats observe; `read` returns
+    any form for any seats and worlds.
+
+    With a reaction time, all but a seat's own paddle is observed with this latency;
+    `begin` and `note` must be called with what is sensed.
+
+    Args:
+        scenario: Scenario, which lists the observables and has the reaction time.
+        sensor: Sensor, which keeps the history.
+        physics: Ranges of the top speed.
+        forms: Forms of observations that can be read, see `observable.OBSERVE`; the
+            first one is that of the open seats.
+
+    Raises:
+        ValueError: An unknown form, or a reaction time that is no multiple of the
+            control step.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        sensor: Sensor,
+        physics: Physics,
+        forms: Collection[str],
+    ) -> None:
+        self.scenario, self.sensor, self.forms = scenario, sensor, tuple(forms)
+        for form in forms:
+            if form not in OBSERVE:
+                raise ValueError(unknown_name("observe", form, OBSERVE))
+        self.observe = self.forms[0]
+        """Form of the open seats' observations."""
+        self._top_speed = physics.highest("paddle_speed")
+        steps = _whole_steps(scenario.reaction, sensor.control_dt)
+        self._delay = ReactionDelay(steps) if steps else None
+        self.reaction = steps * sensor.control_dt
+        """Latency of observations by the rules of the game, s."""
+        self.direct = self.observe == "velocity" and sensor.ideal and not steps
+        """True if open seats observe the true state, so that `stage` fills it in."""
+        self._layouts: dict[str, ObservationLayout] = {}
+        self._fused: dict[str, Fused] = {}
+        self.layout_of(self.observe)
+
+    def layout_of(self, form: str) -> ObservationLayout:
+        """Return the layout of a form; that of "pixels" is the one of "velocity".
+
+        Raises:
+            ValueError: A form that these worlds were not built for.
+        """
+        if form not in self.forms:
+            raise ValueError(
+                f"observe: {form!r} cannot be read here, only {', '.join(self.forms)}; "
+                f"name it when the worlds are built, forms=({form!r},)"
+            )
+        if form not in self._layouts:
+            scope = ObservationContext(
+                self.scenario.scene,
+                "velocity" if form == "pixels" else form,
+                self._top_speed,
+                self.reaction,
+            )
+            apart = self.scenario.goals == "dict"
+            observables = tuple(
+                p for p in self.scenario.observation if not (apart and p.goal)
+            )
+            self._layouts[form] = layout = ObservationLayout(observables, scope)
+            show = partial(self._show, layout)
+            self._fused[form] = Fused(show, self.scenario.name)
+        return self._layouts[form]
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """Layout of the open seats' observations."""
+        return self._layouts[self.observe]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the numbers that open seats observe; none for pictures."""
+        return () if self.observe == "pixels" else self.layout.labels
+
+    def begin(self, worlds: Array, sensed: State, memory: Memory) -> None:
+        """Begin an episode in some worlds, by index; compile what is not compiled yet.
+
+        Args:
+            worlds: Indices (W,) of the worlds.
+            sensed: Sensed state of all worlds, table frame.
+            memory: Memory of the scenario in all worlds.
+        """
+        if self._delay is not None:
+            self._delay.begin(worlds, self._parts(sensed, memory))
+        for form, fused in self._fused.items():
+            if not fused.prepared:
+                fused.prepare(*self._sources(sensed, memory, form))
+
+    def note(self, sensed: State, memory: Memory) -> None:
+        """Append what is sensed after a step to what is observed later."""
+        if self._delay is not None:
+            self._delay.push(self._parts(sensed, memory))
+
+    def known(
+        self, sensed: State, memory: Memory, form: str = "velocity"
+    ) -> tuple[State, Memory]:
+        """Return the state and the memory of all worlds as seats know them now.
+
+        Args:
+            sensed: Sensed state now.
+            memory: Memory now.
+            form: "estimate" for estimated pucks, any other form for sensed ones.
+        """
+        estimate = form == "estimate"
+        if self._delay is None:
+            return self.sensor.estimated(sensed) if estimate else sensed, memory
+        state = self._delay.delayed("estimate" if estimate else "state")
+        return replace(sensed, **state), self._delay.delayed("memory")
+
+    def prepare(self, state: State, memory: Memory) -> Sink:
+        """Return arrays (B, seats, ...) for `stage` to fill; none if not direct."""
+        if not self.direct:
+            return {}
+        fused = self._fused[self.observe]
+        return fused.prepare(vars(state), memory, self.sensor.past())[0]
+
+    def stage(self, state: State, memory: Memory, shown: Sink) -> list[Stage]:
+        """Return the stage that fills ``shown`` from the true state, by reference.
+
+        The list is empty if not `direct`.
+        """
+        if not self.direct:
+            return []
+        sources = vars(state), memory, self.sensor.past()
+        return [self._fused[self.observe].stage(sources, (shown,))]
+
+    def read(
+        self,
+        sensed: State,
+        memory: Memory,
+        seats: Array,
+        form: str | None = None,
+        worlds: Rows = ALL,
+    ) -> Observation:
+        """Return observations of some seats, in their order, freshly allocated.
+
+        Args:
+            sensed: Sensed state of all worlds, table frame.
+            memory: Memory of the scenario in all worlds.
+            seats: Indices (n,) of the seats.
+            form: Form of the observations; None for that of the open seats.
+            worlds: Worlds to observe.
+        """
+        form = form or self.observe
+        self.layout_of(form)
+        if form == "pixels":
+            return self._pictures(memory, seats, worlds)
+        fused, sources = self._fused[form], self._sources(sensed, memory, form)
+        every = isinstance(worlds, slice)
+        found = fused(*sources) if every else fused.at(np.asarray(worlds), *sources)
+        return self.of_seats(found[0], seats)
+
+    def of_seats(self, shown: Sink, seats: Array) -> Observation:
+        """Return the observations of some seats from those of all; no copy of all."""
+        flat = shown["flat"]
+        if len(seats) != len(self.scenario.scene.seats):
+            flat = flat[:, seats]
+        if len(shown) == 1:
+            return flat
+        return {"observation": flat} | {name: shown[name] for name in GOALS}
+
+    def blank(self, form: str | None, rows: int) -> Observation:
+        """Return observations of one seat that are all zeros, (rows, ...) each.
+
+        Args:
+            form: Form of the observations; None for that of the open seats.
+            rows: Number of rows.
+        """
+        form = form or self.observe
+        layout = self.layout_of(form)
+        if form == "pixels":
+            return np.zeros((rows, PIXELS, PIXELS, FRAMES), np.uint8)
+        flat, game = np.zeros((rows, len(layout.labels)), np.float32), self.scenario
+        if game.goals == "flat" or not isinstance(game, GoalScenario):
+            return flat
+        shape = (rows, len(game.goal_bounds))
+        return {"observation": flat} | {n: np.zeros(shape, np.float32) for n in GOALS}
+
+    def _parts(self, sensed: State, memory: Memory) -> Parts:
+        """Return what is observed with the latency of the game."""
+        past = self.sensor.past() | {"frames": self.sensor.frames}
+        parts = {"state": vars(sensed), "memory": memory, "sensor": past}
+        if "estimate" in self.forms:
+            parts["estimate"] = vars(self.sensor.estimated(sensed))
+        return parts
+
+    def _sources(
+        self, sensed: State, memory: Memory, form: str
+    ) -> tuple[Source, Source, Source]:
+        """Return the arrays of all worlds from which a form of observations is made."""
+        state, known = self.known(sensed, memory, form)
+        sensor = self.sensor.past()
+        if self._delay is not None:
+            # The own paddle, and what was requested of it, are known immediately.
+            sensor["history"] = self._delay.delayed("sensor")["history"]
+            # Contiguous, as compiled loops take them.
+            own = sensed.paddle, sensed.paddle_velocity
+            sensor["own"], sensor["own_velocity"] = map(np.ascontiguousarray, own)
+        return vars(state), known, sensor
+
+    def _show(
+        self, layout: ObservationLayout, sensed: Source, memory: Memory, sensor: Source
+    ) -> tuple[Sink]:
+        """Return the numbers of a layout, and the goals of goals="dict"."""
+        game, state = self.scenario, State(**sensed)
+        own = state.paddle, state.paddle_velocity
+        if layout.scope.reaction:
+            own = sensor["own"], sensor["own_velocity"]
+        past = sensor["history"], sensor["requested"]
+        shown = {"flat": layout.read(EgoView(state, memory, *past, own, layout.scope))}
+        if game.goals == "dict" and isinstance(game, GoalScenario):
+            goals = game.achieved(state, memory), game.desired(memory)
+            for name, goal in zip(GOALS, goals, strict=True):
+                shown[name] = goal[..., None, :].astype(np.float32)
+        return (shown,)
+
+    def _pictures(self, memory: Memory, seats: Array, worlds: Rows) -> Array:
+        from marl_airhockey.sim.sensing.pixels import pictures_of
+
+        frames, goals = self.sensor.frames, memory.get("goal")
+        if self._delay is not None:
+            frames = self._delay.delayed("sensor")["frames"]
+        if goals is not None:
+            goals = goals[worlds]
+        return pictures_of(self.scenario.scene, frames[worlds], goals, seats, PIXELS)
+
+
+def _whole_steps(reaction: float, control_dt: float) -> int:
+    """Return a reaction time in control steps.
+
+    Raises:
+        ValueError: It is no multiple of them.
+    """
+    steps = round(reaction / control_dt)
+    if abs(steps * control_dt - reaction) > 1e-6:
+        near = [k * control_dt for k in (steps, steps + 1)]
+        raise ValueError(
+            f"reaction: {reaction:g} s is no multiple of control_dt, "
+            f"{control_dt:g} s; give another control_dt or an option, e.g. "
+            f'options={{"reaction": {near[0]:g}}} or {near[1]:g}'
+        )
+    return steps
+
+
+def duplicate(observation: Observation) -> Observation:
+    """Return a copy of an observation, which shares no array with it."""
+    if isinstance(observation, np.ndarray):
+        return observation.copy()
+    return {name: array.copy() for name, array in observation.items()}
+
+
+def put(observation: Observation, worlds: Array, rows: Observation) -> None:
+    """Replace the observations of some worlds, by index (W,), in place."""
+    if isinstance(observation, np.ndarray):
+        observation[worlds] = rows
+    elif isinstance(rows, Mapping):
+        for name, array in observation.items():
+            array[worlds] = rows[name]

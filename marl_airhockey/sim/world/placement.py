@@ -1,0 +1,124 @@
+"""Bounds of bodies that are placed from outside: on the table, apart, not too fast."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from marl_airhockey.sim.core.limits import away
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.seat import ReachPlanes, reaches
+from marl_airhockey.sim.core.state import Kind, State
+from marl_airhockey.types import Array
+
+DEEPEST = 0.01
+"""Depth to which bodies may overlap; contacts of pymunk and robosuite are soft (m)."""
+PRESSED = 0.02
+"""Depth to which a paddle that is moved from outside may press a puck into a side, as
+far as pymunk lets it (m)."""
+REACH_SLACK = 0.03
+"""Distance by which an arm may be beyond its reach (m)."""
+FASTEST = 50.0
+"""Speed that no body exceeds (m/s)."""
+
+
+def check_placement(state: State, scene: Scene, parked: Array, longest: float) -> None:
+    """Refuse rows of a state in which a body is where, or as fast as, none can be.
+
+    A paddle that is moved from outside may be over a puck, and one that a teammate
+    pushes in an obstacle.
+
+    Args:
+        state: rows (W,) of bodies.
+        scene: what is on the table.
+        parked: (W, seats) bool: True for paddles that have left the game.
+        longest: length of an episode, s.
+
+    Raises:
+        ValueError: The first such body, or time, its world and the bound.
+    """
+    _refuse("its time is {} s", state.time, longest + 1e-9, 1.0)
+    _refuse("its time is {} s before the episode", -state.time, 0.0, 1.0)
+    names = [
+        f"{kind.name.lower()}_{k}"
+        for kind in Kind
+        for k in range(state.bodies.kind.count(kind))
+    ]
+    gone = np.zeros((len(parked), len(names)), np.bool_)
+    gone[:, state.bodies.paddle] = parked
+    for i in range(state.bodies.movers):
+        speed = np.linalg.norm(state.velocity[:, i], axis=-1)
+        _refuse(f"{names[i]} moves at {{}} m/s", speed, FASTEST, 1.0)
+        rim = np.abs(state.spin[:, i]) * state.bodies.radius[i]
+        _refuse(f"{names[i]} spins at {{}} m/s at its rim", rim, FASTEST, 1.0)
+        off = np.where(gone[:, i], 0.0, _depth(state, scene, i))
+        puck = state.bodies.kind[i] is Kind.PUCK
+        most = PRESSED if puck else DEEPEST
+        _refuse(f"{names[i]} is off the table by {{}} mm", off, most)
+    beyond = np.where(parked, 0.0, _beyond_reach(state, scene))
+    for i in range(state.bodies.paddles):
+        what = f"paddle_{i} is out of the reach of its seat by {{}} mm"
+        _refuse(what, beyond[:, i], REACH_SLACK)
+    # A puck that has ended a game stays on the goal line, and paddles pass it.
+    gone[:, state.bodies.puck] = _on_goal_line(state, scene)
+    paddles, pucks = state.bodies.paddles, state.bodies.pucks
+    for i, k in combinations(range(state.bodies.movers), 2):
+        if i < paddles <= k < paddles + pucks:
+            continue
+        between = np.linalg.norm(state.position[:, i] - state.position[:, k], axis=-1)
+        overlap = state.bodies.radius[i] + state.bodies.radius[k] - between
+        overlap[gone[:, i] | gone[:, k]] = 0.0
+        _refuse(f"{names[i]} and {names[k]} overlap by {{}} mm", overlap, DEEPEST)
+
+
+def _refuse(what: str, values: Array, most: float, scale: float = 1e3) -> None:
+    """Refuse the first world whose value is above a bound; ``scale`` is of the text."""
+    worlds = np.flatnonzero(values > most)
+    if len(worlds):
+        found = what.format(f"{scale * values[worlds[0]]:.4g}")
+        where = f" in world {worlds[0]}" if len(values) > 1 else ""
+        raise ValueError(f"state: {found}{where}; at most {scale * most:g} is possible")
+
+
+def _depth(state: State, scene: Scene, body: int) -> Array:
+    """(W,) depth of a body in a side or an obstacle, m; < 0 if it is clear of both.
+
+    The centre of a puck may be as far as a goal line. Of paddles, sides alone count.
+    """
+    table, position = scene.table, state.position[:, body]
+    radius = state.bodies.radius[body]
+    depth = radius - (position @ table.normals.T + table.offsets)
+    if state.bodies.kind[body] is Kind.PUCK:
+        depth[_before_goal(position, scene)] -= radius
+    paddle = state.bodies.kind[body] is Kind.PADDLE
+    for row in () if paddle else ReachPlanes.of(table, scene.seats).obstacles:
+        clear = [away(row, x, y)[2] for x, y in position]
+        gap = np.array(clear) + table.paddle_radius - radius
+        depth = np.column_stack([depth, -gap])
+    return np.asarray(depth.max(-1))
+
+
+def _before_goal(position: Array, scene: Scene) -> Array:
+    """(..., sides) bool: a point (..., 2) is between the ends of a side's goal line."""
+    sides = scene.table.normals.shape[0]
+    before = np.zeros((*position.shape[:-1], sides), np.bool_)
+    for line in scene.goal_lines:
+        start, end = scene.opening(line)
+        reach = np.linalg.norm(end - start) / 2
+        along = (position - (start + end) / 2) @ (end - start) / (2 * reach)
+        before[..., line.side] |= np.abs(along) < reach
+    return before
+
+
+def _on_goal_line(state: State, scene: Scene) -> Array:
+    """(W, pucks) bool: the centre of a puck is on a goal line, or beyond it."""
+    depth = -(state.puck @ scene.table.normals.T + scene.table.offsets)
+    return np.asarray((_before_goal(state.puck, scene) & (depth > -1e-6)).any(-1))
+
+
+def _beyond_reach(state: State, scene: Scene) -> Array:
+    """(W, seats) distance of each paddle beyond its seat's reach, m."""
+    normals, offsets = reaches(scene.table, scene.seats)
+    inside = np.einsum("skd,wsd->wsk", normals, state.paddle) + offsets
+    return np.asarray(-inside.min(-1))

@@ -1,0 +1,75 @@
+"""Gymnasium spaces of actions and observations, and what a critic may know."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from gymnasium import spaces
+
+from marl_airhockey.sim.contracts.observable import FRAMES
+from marl_airhockey.sim.contracts.scenario import GoalScenario
+from marl_airhockey.sim.world.global_state import GlobalState
+from marl_airhockey.sim.world.observer import PIXELS, Observer
+from marl_airhockey.types import Array
+
+if TYPE_CHECKING:
+    from marl_airhockey.sim.world.world import World
+
+
+def action_space() -> spaces.Box:
+    """Wanted velocity as a fraction of top speed, ego frame: Box(-1, 1, (2,))."""
+    return spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def observation_space(observer: Observer, observe: str | None = None) -> Any:
+    """Box, or the Dict of goals="dict"."""
+    observe = observe or observer.observe
+    if observe == "pixels":
+        return spaces.Box(0, 255, (PIXELS, PIXELS, FRAMES), np.uint8)
+    layout = observer.layout_of(observe)
+    flat = spaces.Box(layout.low, layout.high, dtype=np.float32)
+    scenario = observer.scenario
+    if scenario.goals == "flat" or not isinstance(scenario, GoalScenario):
+        return flat
+    high = np.array(scenario.goal_bounds, np.float32)
+    goal = [spaces.Box(-high, high, dtype=np.float32) for _ in range(2)]
+    return spaces.Dict(observation=flat, achieved_goal=goal[0], desired_goal=goal[1])
+
+
+class WorldSpaces:
+    """Mixin of worlds: spaces of an open seat, and the state that a critic may know."""
+
+    observer: Observer
+
+    @property
+    def observation_space(self) -> Any:
+        """Space of the observation of an open seat."""
+        return observation_space(self.observer)
+
+    @property
+    def action_space(self) -> spaces.Box:
+        """Space of the action of a seat."""
+        return action_space()
+
+    @cached_property
+    def _global_state(self) -> GlobalState:
+        return GlobalState(cast("World", self))
+
+    @property
+    def critic_state_space(self) -> spaces.Box:
+        """Space of a row of `critic_state`."""
+        return self._global_state.space
+
+    @property
+    def critic_state_labels(self) -> tuple[str, ...]:
+        """Name of each number of a row of `critic_state`."""
+        return self._global_state.labels
+
+    def critic_state(self) -> Array:
+        """Return (B, S) float32: the true state, for a critic of all seats.
+
+        See `global_state.GlobalState`; freshly allocated.
+        """
+        return self._global_state.read()

@@ -1,0 +1,513 @@
+"""World: one step function over B worlds, which all environments are views of.
+
+A step, `World.step`:
+
+1. collect: actions of open seats and drivers -> inputs, delayed (`world.actions`)
+2. limit: action -> command, followed by a servo if there is one (`core.limits`)
+3. move: command -> state (`backends`)
+4. judge: state -> memory, reward terms, success, end (`world.referee`)
+5. observe: state -> observation, where seats observe the true state (`world.observer`)
+6. sense: state -> sensed state, served pucks included (`sensing`); observe that else
+7. reset: a new episode in the worlds where one ended
+
+Steps 2 to 5 are one pipeline of compiled stages (`world.control_step`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from marl_airhockey.sim.contracts.backend import Backend
+from marl_airhockey.sim.contracts.driver import Driver
+from marl_airhockey.sim.contracts.scenario import Scenario
+from marl_airhockey.sim.core.checks import check_count
+from marl_airhockey.sim.core.parameters import SCATTER
+from marl_airhockey.sim.core.physics import Physics
+from marl_airhockey.sim.core.rng import RandomStreams, StreamSet, seeds_of
+from marl_airhockey.sim.core.seat import ReachPlanes
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.sensing.sensor import Needs, Sensor
+from marl_airhockey.sim.world.actions import Actions
+from marl_airhockey.sim.world.control_step import ControlStep, Moment
+from marl_airhockey.sim.world.driven_seat import DrivenSeat
+from marl_airhockey.sim.world.elements import DragRegions, check_elements, clear_start
+from marl_airhockey.sim.world.episode import EpisodeCounters, PhysicsRows
+from marl_airhockey.sim.world.known import Known
+from marl_airhockey.sim.world.observer import Observation, Observer, duplicate, put
+from marl_airhockey.sim.world.placement import check_placement
+from marl_airhockey.sim.world.referee import Referee
+from marl_airhockey.sim.world.sensed_memory import SensedMemory
+from marl_airhockey.sim.world.set_state import checked_memory, checked_worlds, settled
+from marl_airhockey.sim.world.spaces import WorldSpaces
+from marl_airhockey.sim.world.step_result import StepResult
+from marl_airhockey.types import Array, Memory
+
+NOWHERE = np.zeros(0, np.int64)
+"""Indices of no worlds."""
+
+
+class World(WorldSpaces):
+    """B worlds of one scenario on one backend.
+
+    Worlds can be copied and pickled at any moment; the copy is independent.
+
+    Args:
+        scenario: Scenario.
+        backend: Physics, built for the scenario's scene.
+        drivers: Drivers of the seats that are not open, by seat index.
+        physics: Parameters and their ranges.
+        forms: Forms of observations that open seats, drivers and later players can
+            read, see `observable.OBSERVE`; the first one is that of the open seats.
+        max_cycles: Length of an episode in control steps; None for the scenario's.
+        autoreset: Whether a new episode begins immediately where one ended.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        backend: Backend,
+        drivers: Mapping[int, Driver],
+        physics: Physics,
+        forms: Collection[str] = ("velocity",),
+        max_cycles: int | None = None,
+        autoreset: bool = True,
+    ) -> None:
+        self.scenario, self.backend, self.physics = scenario, backend, physics
+        self.scene = scene = scenario.scene
+        self.num_worlds = b = backend.num_worlds
+        self.control_dt = dt = backend.control_dt
+        self.autoreset, seats = autoreset, range(len(scene.seats))
+        cycles = round(scenario.seconds / dt) if max_cycles is None else max_cycles
+        self._limit = np.full(b, check_count("max_cycles", cycles))
+        self.open = np.array([s for s in seats if s not in drivers], np.int64)
+        self.reach = ReachPlanes.of(scene.table, scene.seats)
+        sight = backend.sight if backend.senses_itself else None
+        self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), sight)
+        self.observer = Observer(scenario, self.sensor, physics, forms)
+        self.driven = [
+            DrivenSeat(seat, driver, self.observer, b, dt)
+            for seat, driver in sorted(drivers.items())
+        ]
+        rotations, tracks = self.reach.rotation, backend.tracks_commands
+        self.referee = Referee(scenario, rotations, tracks)
+        self._actions = Actions(scenario, self.driven, self.open, physics, b, dt)
+        self._requested = np.zeros((b, len(seats), 2))
+        self._seeded, self.seeds = False, np.zeros(b, np.uint64)
+        """(B,) seed of each world"""
+        self._scatters = physics.any_of(*SCATTER)
+        contact = ("contact",) if self._scatters else ()
+        self._streams = StreamSet(b, "start", "physics", "sensor", "serve", *contact)
+        self._episode = EpisodeCounters.empty(b, len(seats))
+        self._state, self._memory = scene.still_state(b), Memory()
+        self._sensed = self._best = self._judged = self._state
+        self._follower = None if self.sensor.ideal else SensedMemory(scenario)
+        self._step: ControlStep | None = None
+        check_elements(scenario, backend.senses_itself)
+        self._drag = DragRegions(scenario, b) if scenario.drag_regions else None
+        self.start_spread = 1.0
+        """Share of the ranges, about their middles, from which episodes start"""
+        self.closed = False
+        """True after `close`"""
+
+    @property
+    def state(self) -> State:
+        """True state, table frame; freshly allocated."""
+        return self._state.map(np.copy)
+
+    @property
+    def judged(self) -> State:
+        """State that the rules judged in the last step, before serves; a copy."""
+        return self._judged.map(np.copy)
+
+    @property
+    def serves(self) -> bool:
+        """True if the rules of the game serve pucks."""
+        return "serves" in self._built.now.verdict.outcome
+
+    @property
+    def sensed(self) -> State:
+        """State as the sensor sees it, table frame; freshly allocated."""
+        return self._sensed.map(np.copy)
+
+    @property
+    def memory(self) -> Memory:
+        """Memory of the scenario; freshly allocated."""
+        return {name: array.copy() for name, array in self._memory.items()}
+
+    @property
+    def known(self) -> Known:
+        """What seats know now; freshly allocated, but for the physics."""
+        return self._known.copied()
+
+    @property
+    def episode(self) -> EpisodeCounters:
+        """Counters of the running episodes; freshly allocated, but for the physics."""
+        return self._episode.copied()
+
+    @property
+    def action(self) -> Array:
+        """(B, seats, 2) actions of the last step, after their delay; a copy."""
+        return self._actions.inputs.action.copy()
+
+    @property
+    def requested(self) -> Array:
+        """(B, seats, 2) actions of the last step, before their delay; a copy."""
+        return self._requested.copy()
+
+    @property
+    def command(self) -> Array:
+        """(B, seats, 2) command of the last step, table frame, m/s; a copy."""
+        return self._built.now.realized.velocity.copy()
+
+    @property
+    def terms(self) -> dict[str, Array]:
+        """Reward terms of the last step by name, (B, seats) each; copies."""
+        terms = self._built.now.verdict.terms
+        return {name: term.copy() for name, term in terms.items()}
+
+    @property
+    def observation_labels(self) -> tuple[str, ...]:
+        """Name of each element of an open seat's flat observation; or none."""
+        return self.observer.labels
+
+    @property
+    def max_cycles(self) -> int:
+        """Length of an episode in control steps."""
+        return int(self._limit[0])
+
+    @max_cycles.setter
+    def max_cycles(self, cycles: int) -> None:
+        self.limit_cycles(cycles)
+
+    @property
+    def limits(self) -> Array:
+        """(B,) length of an episode in control steps; a copy."""
+        return self._limit.copy()
+
+    def limit_cycles(self, cycles: int, worlds: Array | None = None) -> None:
+        """Set the length of an episode, from the one that is running on.
+
+        Args:
+            cycles: Control steps.
+            worlds: (W,) indices; None for all.
+
+        Raises:
+            ValueError: Not a whole number of at least 1.
+        """
+        self._limit[slice(None) if worlds is None else worlds] = check_count(
+            "max_cycles", cycles
+        )
+
+    @property
+    def outcome(self) -> dict[str, Array]:
+        """Outcome of the last step for all seats, and ends of episodes; copies.
+
+        ``reward`` (B, seats), ``applied_action`` (B, seats, 2), ``violation``
+        (B, seats, 5), and (B,) ``terminated`` and ``truncated``.
+        """
+        now = self._built.now
+        names = "reward", "applied_action", "terminated", "truncated"
+        parts = {name: now.verdict.outcome[name].copy() for name in names}
+        return parts | {"violation": now.commanded.violation.copy()}
+
+    @property
+    def _built(self) -> ControlStep:
+        if self._step is None:
+            self._refuse_closed("step")
+            raise RuntimeError("step: call reset() first; no episode is running")
+        return self._step
+
+    def _refuse_closed(self, call: str) -> None:
+        if self.closed:
+            raise RuntimeError(f"{call}: this environment is closed; build another")
+
+    @property
+    def eliminated(self) -> Array | None:
+        """(B, seats) bool: True for seats that have left the game; None if none can."""
+        return self.scenario.eliminated(self._memory)
+
+    def seed(self, seed: int | Sequence[int] | None = None) -> None:
+        """Set the seeds of the worlds from the next `reset` on.
+
+        Args:
+            seed: world i gets seed + i, or the i-th of B numbers; None draws one from
+                the system.
+
+        Raises:
+            ValueError: neither a whole number nor one for each world, or not one from
+                0 to 2^64 - 1.
+        """
+        if seed is None:
+            seed = int(np.random.SeedSequence().generate_state(1)[0])
+        self.seeds = seeds_of(seed, self.num_worlds)
+        self._episode.number[:] = 0
+        self._seeded = True
+
+    def reset(self, seed: int | Sequence[int] | None = None) -> Observation:
+        """Begin a new episode everywhere and return the first observation.
+
+        Args:
+            seed: see `seed`; None goes on with the streams there are.
+        """
+        self._refuse_closed("reset")
+        if seed is not None or not self._seeded:
+            self.seed(seed)
+        self.reset_worlds(np.arange(self.num_worlds))
+        return self.observation()
+
+    def begin(self, rows: State | None, numbers: Array) -> None:
+        """Begin given episodes everywhere, such as recorded ones; see `seed`.
+
+        Args:
+            rows: States (B, ...) in which they begin; None for those that the scenario
+                samples.
+            numbers: (B,) numbers of the episodes since the worlds had their seeds, from
+                1; each has random streams of its own.
+        """
+        self._episode.number[:] = numbers - 1
+        self.draw_worlds(np.arange(self.num_worlds), rows)
+
+    def reset_worlds(self, worlds: Array) -> None:
+        """Begin a new episode in some worlds, by index (W,)."""
+        rng = self.draw_worlds(worlds)
+        if self.backend.senses_itself:
+            # All is compiled now, so that no time is lost once the puck moves.
+            state = self.backend.arrange(self._state)
+            memory = self.scenario.initial_memory(state, rng)
+            self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
+        for seat in self.driven:
+            seat.reset(worlds, self.seeds, self._episode.number)
+
+    def draw_worlds(self, worlds: Array, rows: State | None = None) -> RandomStreams:
+        """Draw how a new episode begins in some worlds, by index (W,).
+
+        If states are given as ``rows``, it begins with these.
+        On a real table, where somebody has still to bring it about, that is all.
+        Returns the streams from which the start is drawn.
+        """
+        number = self._episode.number
+        number[worlds] += 1
+        self._streams.renew(worlds, self.seeds, number)
+        stream = self._streams.of("physics")
+        changed = self._episode.draw_physics(self.physics, stream, worlds)
+        if len(changed):
+            self.backend.set_physics(self._episode.physics, changed)
+        self._key_scatter(worlds)
+        if self._drag is not None:
+            self._drag.forget(worlds)
+        rng = self._streams.of("start", worlds)
+        rng.spread = self.start_spread
+        if rows is None:
+            rows, memory = clear_start(self.scenario, rng, len(worlds))
+        else:
+            memory = self.scenario.initial_memory(rows, rng)
+        self._begin(worlds, rows, self._aimed(rng, rows, memory, worlds))
+        return rng
+
+    def set_state(
+        self, state: State, memory: Memory | None = None, worlds: Array | None = None
+    ) -> Observation:
+        """Go on from a given state; return the observation of all worlds.
+
+        It is as if all bodies had come here at their velocities and what touches had
+        touched for long; returns and success begin at none. See `world.set_state`.
+
+        Args:
+            state: of W worlds, (W, ...); of one, the leading axis may be missing.
+            memory: of the scenario; None for one of an episode that begins here.
+            worlds: (W,) indices; None for all.
+
+        Raises:
+            RuntimeError: before the first `reset`.
+            ValueError: an index that is no world, a wrong shape, a number that is not
+                finite, a time before the episode or after its end, or a body off the
+                table, out of its reach, in another one or too fast, named.
+        """
+        if self._step is None:
+            self._refuse_closed("set_state")
+            raise RuntimeError("set_state: call reset() first, which draws the physics")
+        worlds = checked_worlds(worlds, self.num_worlds)
+        rows = settled(state, self.scene, len(worlds))
+        longest = float(self._limit[worlds].min()) * self.control_dt
+        if memory is None:
+            rng = self._streams.of("start", worlds)
+            memory = self.scenario.initial_memory(rows, rng)
+            memory = self._aimed(rng, rows, memory, worlds)
+        memory = checked_memory(memory, self._memory, len(worlds))
+        parked = self.scenario.eliminated(memory)
+        if parked is None:
+            parked = np.zeros((len(worlds), len(self.scene.seats)), np.bool_)
+        check_placement(rows, self.scene, parked, longest)
+        self._key_scatter(worlds)
+        self._begin(worlds, rows, memory)
+        self._episode.cycles[worlds] = np.round(rows.time / self.control_dt)
+        for seat in self.driven:
+            seat.begin(worlds)
+        return self.observation()
+
+    def _aimed(
+        self, rng: RandomStreams, rows: State, memory: Memory, worlds: Array
+    ) -> Memory:
+        """Return the memory of episodes that begin, with what their physics decides."""
+        physics = PhysicsRows(self._episode.physics, worlds)
+        return self.scenario.finalize_goals(rng, rows, memory, physics)
+
+    def _key_scatter(self, worlds: Array) -> None:
+        """Let equal states of an episode have the same future, scatter and all."""
+        if self._scatters:
+            self.backend.key_scatter(self._streams.keys("contact"), worlds)
+
+    def get_state(self) -> tuple[State, Memory]:
+        """Return the true state and the memory, which `set_state` takes."""
+        return self.state, self.memory
+
+    def _begin(self, worlds: Array, rows: State, memory: Memory) -> None:
+        """Begin an episode in some worlds, by index, from rows of state and memory."""
+        if self._step is None:
+            rules = self.backend, self.referee, self.observer, self.reach, self._limit
+            lags = self.backend.tracks_commands and self.physics.any_of("servo_time")
+            begun = self._episode, rows, memory
+            self._step = ControlStep(self._actions.inputs, *rules, *begun, lags)
+            self._adopt(self._step.now)
+        self._place(worlds, rows, memory)
+        self._step.now.begin(worlds)
+        self._actions.reset(worlds)
+        self._sensed = self.sensor.begin(worlds, *self._true)
+        self._inform(worlds)
+        self.observer.begin(worlds, self._sensed, self._known_memory)
+
+    def _inform(self, worlds: Array) -> None:
+        """Let seats know the memory in some worlds, by index, as it is."""
+        if self._follower is not None:
+            self._follower.begin(worlds, self._memory)
+            self._best = self.sensor.best(self._sensed)
+
+    def _place(self, worlds: Array, rows: State, memory: Memory) -> None:
+        """Put rows of a state and a memory into some worlds, by index."""
+        self._built.now.write(worlds, rows, memory)
+        self.backend.reset(self._state, worlds)
+
+    @property
+    def _known(self) -> Known:
+        memory, episode = self._known_memory, self._episode
+        return Known(self._sensed, memory, episode.physics, episode.cycles)
+
+    @property
+    def _known_memory(self) -> Memory:
+        """Memory as seats know it, which observations show."""
+        return self._memory if self._follower is None else self._follower.now
+
+    def _adopt(self, moment: Moment) -> None:
+        self._state = self._judged = moment.state
+        self._memory = moment.verdict.memory
+        self._episode = moment.episode
+
+    @property
+    def _true(self) -> tuple[State, dict[str, Array], StreamSet]:
+        """State, physics and streams that the sensor takes."""
+        return self._state, self._episode.physics, self._streams
+
+    def observation(self) -> Observation:
+        """Return what the open seats observe now, freshly allocated."""
+        return self.observer.read(self._sensed, self._known_memory, self.open)
+
+    def observe(self, seats: Array) -> Observation:
+        """Return what seats (n,) would observe as open ones, freshly allocated."""
+        return self.observer.read(self._sensed, self._known_memory, seats)
+
+    def step(self, actions: Array, prescribed: Array | None = None) -> StepResult:
+        """Move all worlds by one control step.
+
+        Args:
+            actions: Velocities (B, open, 2), fractions of top speed in ego frames.
+            prescribed: Measured positions and velocities (B, open, 4) of paddles, ego
+                frames, m and m/s; nan for seats that request an action. None: all do.
+
+        Raises:
+            RuntimeError: Before the first `reset`.
+            ValueError: A wrong shape, or an element that is not finite.
+        """
+        step = self._built
+        self._requested = self._actions.collect(actions, prescribed, self._known)
+        self.sensor.note(self._requested)
+        if self._drag is not None:
+            self._drag.update(self.backend, self._state, self._episode.physics)
+        moment = step()
+        self._adopt(moment)
+        result = StepResult.of(moment, self.open if self.driven else None)
+        if self.backend.senses_itself and self.backend.interruption:
+            result.interruption = self.backend.interruption
+            result.truncated[:] = True
+        self._observe(moment, result)
+        if self.autoreset:
+            self._restart(result)
+        return result
+
+    def empty_result(self) -> StepResult:
+        """Return the result of no step: all 0, without observation."""
+        result = StepResult.of(self._built.now, self.open if self.driven else None)
+        result.clear()
+        return result
+
+    def _observe(self, moment: Moment, result: StepResult) -> None:
+        """Sense, serve where a puck is needed, and observe."""
+        observer, seats = self.observer, self.open
+        self._sensed = self.sensor.sense(*self._true)
+        if self._follower is not None:
+            before, self._best = self._best, self.sensor.best(self._sensed)
+            step = before, moment.realized.velocity, self._best
+            self._follower.update(*step, self._memory)
+            if self.scenario.goals == "dict":
+                known = self._sensed, self._known_memory, observer.observe
+                shown = observer.known(*known)
+                result.judge_shown(self.scenario, *shown, moment, self._limit)
+        served = self._serve(moment)
+        observer.note(self._sensed, self._known_memory)
+        if not observer.direct:
+            result.observation = self.observation()
+            return
+        direct = {name: array.copy() for name, array in moment.shown.items()}
+        result.observation = observer.of_seats(direct, seats)
+        if len(served):
+            self._observe_again(result.observation, served)
+
+    def _observe_again(self, observation: Observation, worlds: Array) -> None:
+        """Replace what open seats observe in some worlds, by index, in place."""
+        now = self._sensed, self._known_memory, self.open
+        put(observation, worlds, self.observer.read(*now, worlds=worlds))
+
+    def _serve(self, moment: Moment) -> Array:
+        """Serve a puck where the rules need one; return these worlds, by index."""
+        serves = moment.verdict.outcome.get("serves")
+        # count_nonzero: for few worlds, `any` costs as much as the physics.
+        if serves is None or not np.count_nonzero(serves):
+            return NOWHERE
+        worlds, self._judged = np.flatnonzero(serves), self.state
+        # `take` is several times faster than an index.
+        rows = self._state.map(lambda x: x.take(worlds, 0))
+        memory = {name: x.take(worlds, 0) for name, x in self._memory.items()}
+        rng = self._streams.of("serve", worlds)
+        self._place(worlds, *self.scenario.serve(rng, rows, memory))
+        self._sensed = self.sensor.reset(worlds, *self._true)
+        self._inform(worlds)
+        return worlds
+
+    def _restart(self, result: StepResult) -> None:
+        """Begin a new episode in the worlds that ended."""
+        ended = result.terminated | result.truncated
+        if np.count_nonzero(ended):
+            worlds = np.flatnonzero(ended)
+            result.final_observation = duplicate(result.observation)
+            self.reset_worlds(worlds)
+            self._observe_again(result.observation, worlds)
+
+    def close(self) -> None:
+        """Close the backend and leave the drivers; nothing can be played any more."""
+        if self.closed:
+            return
+        self.closed, self._step = True, None
+        self.backend.close()
+        for seat in self.driven:
+            seat.driver.__exit__(None, None, None)
