@@ -10,7 +10,7 @@ import numpy as np
 
 from marl_airhockey.sim.contracts.observable import Observable
 from marl_airhockey.sim.contracts.scenario import Scenario, Transition
-from marl_airhockey.sim.contracts.units import Latency, Metres, Pucks, Seconds, Weight
+from marl_airhockey.sim.contracts.units import Latency, Metres, Seconds, Weight
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import GoalLine, Scene
 from marl_airhockey.sim.core.state import State
@@ -35,7 +35,7 @@ class Versus(Scenario):
     reaction: Latency = 0.15
     goals_to_win: int = 7
     """Number of goals that wins."""
-    pucks: Pucks = 1
+    pucks: int = 1
     """Number of pucks in play."""
     goal_width: Metres = 0.30
     """Width of the goal lines (m)."""
