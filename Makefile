@@ -90,7 +90,7 @@ lint check: export MYPY_CACHE_DIR := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/marl
 lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios agents scripts tests
+	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios drivers scripts tests
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy
 

@@ -7,7 +7,7 @@ import lazy_loader as _lazy_loader
 
 _here = _Path(__file__).parent
 if not (_here / "scenarios").is_dir():
-    # In a checkout scenarios/ and agents/ lie beside this package; in a wheel, in it.
+    # In a checkout scenarios/ and drivers/ lie beside this package; in a wheel, in it.
     __path__.append(str(_here.parent))
 
 # The public names are listed in __init__.pyi; each is imported when it is first used.

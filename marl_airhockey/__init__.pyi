@@ -14,9 +14,9 @@ from .make import make_vec as make_vec
 from .make import make_world as make_world
 from .make import parallel_env as parallel_env
 from .policies.load import load_policy as load_policy
-from .registry import agent_names as agent_names
 from .registry import backend_names as backend_names
-from .registry import make_agent as make_agent
+from .registry import driver_names as driver_names
+from .registry import make_driver as make_driver
 from .registry import make_scenario as make_scenario
 from .registry import scenario_names as scenario_names
 from .rollout.rollout import rollout as rollout

@@ -10,7 +10,7 @@ from marl_airhockey.registry import (
     DEFAULT_BACKEND,
     find_backend,
     find_scenario,
-    make_agent,
+    make_driver,
 )
 from marl_airhockey.sim.contracts.backend import Backend
 from marl_airhockey.sim.contracts.driver import Driver
@@ -44,7 +44,7 @@ def build_world(
         autoreset: Whether a new episode begins where one ended.
         keywords: Keywords, all optional:
             backend: Name of the physics ("numba").
-            drivers: Drivers of seats by agent, see `registry.make_agent`: names, paths
+            drivers: Drivers of seats by agent, see `registry.make_driver`: names, paths
                 of policies, functions, models and so on; the other seats are open.
             seats: "robot" or "arcade".
             profile: "ideal", or the sensing and the spread of physics of a robot:
@@ -180,7 +180,7 @@ def _drivers(game: Scenario, backend: Backend, keywords: Keywords) -> dict[int, 
     for agent, driver in keywords.get("drivers", {}).items():
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
-        drivers[agents.index(agent)] = seated = make_agent(driver)
+        drivers[agents.index(agent)] = seated = make_driver(driver)
         refuse_erratic(agent, seated, backend)
     return drivers
 

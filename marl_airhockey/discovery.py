@@ -1,4 +1,4 @@
-"""Names of scenarios and agents: the files of their folders, none imported.
+"""Names of scenarios and drivers: the files of their folders, none imported.
 
 ``import marl_airhockey`` registers every scenario with gymnasium, whose ids hold a
 version; importing all scenarios for that would load most of the package.
@@ -16,7 +16,7 @@ VERSION = re.compile(r"^    version: ClassVar\[int\] = (\d+)$", re.MULTILINE)
 
 
 def names_in(folder: str) -> list[str]:
-    """Return the names of the files of ``scenarios/`` or ``agents/``."""
+    """Return the names of the files of ``scenarios/`` or ``drivers/``."""
     package = importlib.import_module(f"marl_airhockey.{folder}")
     found = pkgutil.iter_modules(package.__path__)
     return sorted(m.name for m in found if not m.name.startswith("_"))

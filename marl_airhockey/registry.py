@@ -52,14 +52,14 @@ def plugin_names(kind: str) -> list[str]:
     return sorted(plugins(kind))
 
 
-def agent_names() -> list[str]:
-    """Return the names of all drivers: the files of ``agents/``."""
-    return names_in("agents")
+def driver_names() -> list[str]:
+    """Return the names of all drivers: the files of ``drivers/``."""
+    return names_in("drivers")
 
 
-def program_names() -> list[str]:
+def independent_driver_names() -> list[str]:
     """Return the names of drivers that play by themselves: no device, no person."""
-    kinds = {name: agent_class(name) for name in agent_names()}
+    kinds = {name: driver_class(name) for name in driver_names()}
     return [
         name
         for name, kind in kinds.items()
@@ -67,13 +67,13 @@ def program_names() -> list[str]:
     ]
 
 
-def agent_class(name: str) -> type[Driver]:
-    """Return the class of a driver in ``agents/``.
+def driver_class(name: str) -> type[Driver]:
+    """Return the class of a driver in ``drivers/``.
 
     Raises:
         ValueError: An unknown name.
     """
-    return cast(type[Driver], _load("driver", "agents", name, agent_names()).make)
+    return cast(type[Driver], _load("driver", "drivers", name, driver_names()).make)
 
 
 def backend_names() -> list[str]:
@@ -136,11 +136,11 @@ def zoo_names() -> list[str]:
     return sorted(f"zoo/{path.stem}" for path in ZOO.glob("*.npz"))
 
 
-def make_agent(player: object, **options: Any) -> Driver:
+def make_driver(player: object, **options: Any) -> Driver:
     """Build a driver from its name, a path, code or an object.
 
     Args:
-        player: Name of a file of ``agents/``, with or without options after a colon
+        player: Name of a file of ``drivers/``, with or without options after a colon
             (``allround:strength=fair,depth=0.05``); of a trained policy that comes with
             the library (``zoo/duel``); of an installed package's driver; path of a
             policy's file or run folder; code, ``my_driver.py`` or
@@ -167,8 +167,8 @@ def _named(given: str | Path) -> tuple[str, Any, dict[str, Any]]:
         if short not in zoo_names():
             raise ValueError(unknown_name("policy of the zoo", short, zoo_names()))
         return short, partial(_load_file, ZOO / f"{short[4:]}.npz"), _options(tail)
-    if short in {*agent_names(), *plugins("drivers")}:
-        return short, _maker("driver", "agents", "drivers", short), _options(tail)
+    if short in {*driver_names(), *plugins("drivers")}:
+        return short, _maker("driver", "drivers", "drivers", short), _options(tail)
     code, tail = _split(text)
     if names_code(code):
         return code, load_code(code, Driver), _options(tail)
@@ -176,7 +176,7 @@ def _named(given: str | Path) -> tuple[str, Any, dict[str, Any]]:
         return text, partial(_load_file, path), {}
     if "/" in text:
         raise ValueError(f"{text}: there is no such run and no such policy")
-    names = [*agent_names(), *plugin_names("drivers")]
+    names = [*driver_names(), *plugin_names("drivers")]
     raise ValueError(
         unknown_name("driver", text, names)
         + "; or a policy's path, my_driver.py or package.module:Class"
@@ -195,7 +195,7 @@ def _driver(name: str, given: Any, options: Mapping[str, Any]) -> Driver:
     if own_class or named_make or isinstance(given, partial):
         parameters = inspect.signature(given).parameters
         options = {
-            option: make_agent(value)
+            option: make_driver(value)
             if option in parameters and "Driver" in str(parameters[option].annotation)
             else value
             for option, value in options.items()
@@ -219,7 +219,7 @@ def _split(text: str) -> tuple[str, str]:
 
 
 def runs_code(text: str) -> bool:
-    """Return True if `make_agent` or `find_scenario` would run code for a text."""
+    """Return True if `make_driver` or `find_scenario` would run code for a text."""
     return names_code(text) or names_code(_split(text)[0])
 
 

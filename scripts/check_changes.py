@@ -74,7 +74,7 @@ def main() -> None:
         if some:
             failed |= run(TOOLS / "pytest", *workers, "-m", "not slow", *sorted(some))
     for path in files:
-        if path.parent.name in ("scenarios", "agents") and path.suffix == ".py":
+        if path.parent.name in ("scenarios", "drivers") and path.suffix == ".py":
             only = "tests/suites", "-m", "not slow", "--only", path.stem
             failed |= run(TOOLS / "pytest", "-n", "2", *only)
     sys.exit(failed)

@@ -11,7 +11,7 @@ from names import GOALS, ideal_backends, seats
 from xdist.scheduler import LoadScopeScheduling
 
 import marl_airhockey as ah
-from marl_airhockey.registry import agent_class
+from marl_airhockey.registry import driver_class
 
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("MUJOCO_GL", "egl")
@@ -74,7 +74,7 @@ def pytest_generate_tests(metafunc):
         "single": lambda: [n for n in ah.scenario_names() if seats(n) == 1],
         "backend": ideal_backends,
         "agent": lambda: [
-            n for n in ah.agent_names() if not agent_class(n).needs_device
+            n for n in ah.driver_names() if not driver_class(n).needs_device
         ],
         "goal_scenario": lambda: GOALS,
     }

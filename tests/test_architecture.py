@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).parents[1] / "marl_airhockey"
-LEAVES = [PACKAGE.parent / folder for folder in ("scenarios", "agents")]
+LEAVES = [PACKAGE.parent / folder for folder in ("scenarios", "drivers")]
 SOURCES = [path for folder in (PACKAGE, *LEAVES) for path in folder.rglob("*.py")]
 LOWER_PACKAGES = (
     *("types", "toolkit"),
@@ -56,9 +56,9 @@ def modules(path):
             yield from (name.name for name in node.names)
 
 
-def test_scenarios_and_agents_import_the_toolkit_alone():
+def test_scenarios_and_drivers_import_the_toolkit_alone():
     # A driver that owns a device imports that, too.
-    may = {"scenarios": ("toolkit",), "agents": ("toolkit", "hardware")}
+    may = {"scenarios": ("toolkit",), "drivers": ("toolkit", "hardware")}
     for path in (path for folder in LEAVES for path in folder.glob("*.py")):
         allowed = tuple(f"marl_airhockey.{name}" for name in may[path.parent.name])
         for module in modules(path):

@@ -23,7 +23,7 @@ def test_the_package_alone_loads_little():
 
 def test_every_public_name_is_there_and_no_other():
     listed = set(ah.__all__)
-    assert {"parallel_env", "make_vec", "make_agent", "evaluate", "train"} <= listed
+    assert {"parallel_env", "make_vec", "make_driver", "evaluate", "train"} <= listed
     assert sorted(listed) == dir(ah)
     for name in listed:
         assert getattr(ah, name).__name__ == name

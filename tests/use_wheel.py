@@ -23,8 +23,8 @@ assert env.reset(seed=0)[0].shape == env.observation_space.shape
 with_a_mate = ah.parallel_env("rally", drivers={"paddle_1": "zoo/rally"})
 with_a_mate.reset(seed=0)
 with_a_mate.step({"paddle_0": np.zeros(2, np.float32)})
-for driver in registry.program_names():
-    ah.make_agent(driver)
+for driver in registry.independent_driver_names():
+    ah.make_driver(driver)
 with contextlib.suppress(RuntimeError):
     ah.make_sb3_vec("juggle")
     sys.exit("the bare wheel has no stable-baselines3, and must say so")

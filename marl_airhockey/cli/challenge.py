@@ -45,7 +45,7 @@ def challenge(
 
         def report(result: Result) -> None:
             """Show the progress."""
-            what = f"{result.scenario} {result.rival or result.profile}"
+            what = f"{result.scenario} {result.opponent or result.profile}"
             progress.update(task, advance=1, note=f"{what} {result.score:.2f}")
 
         card = play_challenge(policy, name or policy, __version__, report=report)

@@ -23,7 +23,7 @@ from marl_airhockey.cli.progress import bar
 from marl_airhockey.evaluation.crossplay import CrossPlay
 from marl_airhockey.evaluation.crossplay import crossplay as play_crossplay
 from marl_airhockey.evaluation.evaluate import TEST_SEED
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
 
 
 def crossplay(
@@ -38,15 +38,17 @@ def crossplay(
     trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
-    """Let players play with mates that they do not know: the coordination gap."""
+    """Let players play with teammates that they do not know: the coordination gap."""
     keywords = environment(backend, profile, option, driver)
-    mates = {name: make_agent(name) for name in players}
-    _, keywords, mates = as_trained_unless_given(mates, scenario, keywords, as_json)
+    teammates = {name: make_driver(name) for name in players}
+    _, keywords, teammates = as_trained_unless_given(
+        teammates, scenario, keywords, as_json
+    )
     with bar() as progress:
-        task = progress.add_task("pairs", total=len(mates) ** 2, note="")
+        task = progress.add_task("pairs", total=len(teammates) ** 2, note="")
         found = play_crossplay(
             scenario,
-            mates,
+            teammates,
             episodes=episodes,
             seed=seed,
             exact=True,
@@ -65,8 +67,8 @@ def crossplay(
 
 
 def table(found: CrossPlay) -> Table:
-    """Return the returns of all pairs, success in brackets; mates are columns."""
-    shown = Table("player", *found.names, title="return (success) with the mate")
+    """Return the returns of all pairs, success in brackets; teammates are columns."""
+    shown = Table("player", *found.names, title="return (success) with the teammate")
     for name, returns, success in zip(
         found.names, found.returns, found.success, strict=True
     ):

@@ -29,7 +29,7 @@ from marl_airhockey.cli.real_table import (
     name_on_table,
     real_table,
 )
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
 from marl_airhockey.sim.core.errors import require
 
 data = typer.Typer(
@@ -74,7 +74,7 @@ def record(
     keywords = environment(backend, profile, option, other)
     name = name_on_table(driver, backend)
     game, keywords, players = as_trained_unless_given(
-        {name: make_agent(name)}, scenario, keywords, as_json
+        {name: make_driver(name)}, scenario, keywords, as_json
     )
     player = players[name]
     if observe is not None:

@@ -43,7 +43,7 @@ from marl_airhockey.evaluation.evaluate import (
 )
 from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.policies.policy import Policy
-from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_driver
 
 FLOORS = ("still", "random", "sticky")
 """Drivers without skill that results are compared with."""
@@ -99,7 +99,7 @@ def evaluate_driver(
         raise ValueError(f"--episodes: {episodes} must be at least 1")
     names = [name_on_table(name, backend) for name in driver]
     scenario, keywords, players = as_trained_unless_given(
-        {name: make_agent(name) for name in names}, scenario, keywords, as_json
+        {name: make_driver(name) for name in names}, scenario, keywords, as_json
     )
     entries, first = list(players.items()), players[names[0]]
     simulated = backend != REAL
@@ -108,7 +108,7 @@ def evaluate_driver(
         sampled = replace(first, deterministic=False)
         entries.append((f"{names[0]} (sampled)", sampled))
     if floors and simulated:
-        entries += [(f, make_agent(f)) for f in FLOORS if f not in names]
+        entries += [(f, make_driver(f)) for f in FLOORS if f not in names]
     results: list[EvaluationResult] = []
     with real_table(keywords, lab, rig) as keywords, bar() as progress:
         task = progress.add_task(scenario, total=len(entries), note="")

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from marl_airhockey.cli.options import Physics, console, physics_of
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.core.parameters import PARAMETERS
 from marl_airhockey.sim.core.profiles import PROFILES
@@ -50,7 +50,7 @@ def fit(
     if recordings is not None:
         seen = load_recordings(recordings_in([recordings]))
     else:
-        player = make_agent(driver or f"zoo/{scenario}")
+        player = make_driver(driver or f"zoo/{scenario}")
         there = physics_of(physics)
         with waiting(f"playing {steps} steps on {backend}"):
             keywords: Keywords = {"backend": backend, "physics": there}

@@ -23,7 +23,7 @@ from marl_airhockey.cli.options import (
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, league
 from marl_airhockey.evaluation.standings import Standings
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
 from marl_airhockey.sim.core.errors import require
 
 SCRIPTS = (
@@ -72,7 +72,7 @@ def play_league(
     entries = [*given, *(find_policies(folder) if folder else [])]
     names = [str(entry) for entry in entries]
     keywords = environment(backend, profile, option, None)
-    entrants = {label(str(entry), names): make_agent(entry) for entry in entries}
+    entrants = {label(str(entry), names): make_driver(entry) for entry in entries}
     _, keywords, entrants = as_trained_unless_given(
         entrants, scenario, keywords, as_json
     )

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from marl_airhockey.cli.options import console
-from marl_airhockey.registry import agent_names, plugin_names, scenario_names
+from marl_airhockey.registry import driver_names, plugin_names, scenario_names
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -35,7 +35,7 @@ def new(
         raise ValueError(f"{name!r}: expected a name like my_task")
     if keyword.iskeyword(name) or find_spec(name) is not None:
         raise ValueError(f"{name}: Python has such a word or module; take another")
-    own = scenario_names() if kind is Kind.SCENARIO else agent_names()
+    own = scenario_names() if kind is Kind.SCENARIO else driver_names()
     if name in {*own, *plugin_names(f"{kind}s")}:
         raise ValueError(f"{name}: there is a {kind} of this name; take another")
     if not out.is_dir():

@@ -25,7 +25,7 @@ from marl_airhockey.cli.options import (
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
 from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
-from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_driver
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -42,7 +42,7 @@ Browser = Annotated[bool, typer.Option(help="Open the page.")]
 Reaction = Annotated[
     float | None,
     typer.Option(
-        help="Time by which programs act late, s.",
+        help="Latency of drivers that are no people, s.",
         min=BOUNDS["reaction"][0],
         max=BOUNDS["reaction"][1],
     ),
@@ -50,7 +50,7 @@ Reaction = Annotated[
 Noise = Annotated[
     float | None,
     typer.Option(
-        help="Noise on actions of programs, of top speed.",
+        help="Noise on their actions, as a fraction of top speed.",
         min=BOUNDS["noise"][0],
         max=BOUNDS["noise"][1],
     ),
@@ -58,7 +58,7 @@ Noise = Annotated[
 Pace = Annotated[
     float | None,
     typer.Option(
-        help="Largest speed of programs, of top speed.",
+        help="Largest of their speeds, as a fraction of top speed.",
         min=BOUNDS["pace"][0],
         max=BOUNDS["pace"][1],
     ),
@@ -112,7 +112,7 @@ def play(
     with real_table(keywords, lab, rig) as table:
         match = kind(scenario, {}, table, Handicap(**given))
         seat_drivers(match, opponent, seats)
-        if not given and kind is LiveMatch and match.has_rivals:
+        if not given and kind is LiveMatch and match.has_opponents:
             match.set_handicap(PRESETS[USUAL])
         with waiting("preparing the table (longer when it is the first time)"):
             match.warm_up()
@@ -125,8 +125,8 @@ def _as_trained(scenario: str, names: set[str | None], given: Keywords) -> Keywo
     """Fill in what is not given from what the policies that play were trained in."""
     from marl_airhockey.play.match_drivers import PERSON
 
-    programs = sorted(str(name) for name in names if name not in (None, PERSON))
-    players = {name: make_agent(name) for name in programs}
+    chosen = sorted(str(name) for name in names if name not in (None, PERSON))
+    players = {name: make_driver(name) for name in chosen}
     _, keywords, _ = as_trained_unless_given(players, scenario, given)
     keywords.pop("drivers", None)  # Every seat of a match gets its driver there.
     return keywords

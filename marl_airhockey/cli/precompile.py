@@ -18,10 +18,10 @@ from marl_airhockey.cli.options import Backend
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.registry import (
     DEFAULT_BACKEND,
-    agent_class,
+    driver_class,
     find_scenario,
-    make_agent,
-    program_names,
+    independent_driver_names,
+    make_driver,
     scenario_names,
     zoo_names,
 )
@@ -87,13 +87,13 @@ def precompile(
 
 def _drivers() -> Iterator[tuple[str, Keywords]]:
     """Yield what drivers and policies of ours play, with the drivers."""
-    for name in program_names():
-        if agent_class(name).needs_goal:
+    for name in independent_driver_names():
+        if driver_class(name).needs_goal:
             yield "reach", Keywords(drivers={"paddle_0": name})
         else:
             yield "duel", Keywords(drivers={"paddle_0": name, "paddle_1": name})
     for name in zoo_names():
-        scenario, keywords = as_trained({name: make_agent(name)}, None, {})
+        scenario, keywords = as_trained({name: make_driver(name)}, None, {})
         drivers = {**keywords.get("drivers", {}), "paddle_0": name}
         yield str(scenario), {**keywords, "drivers": drivers}
 

@@ -20,7 +20,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.policies.trust import require_trust
-from marl_airhockey.registry import find_backend, find_scenario, make_agent
+from marl_airhockey.registry import find_backend, find_scenario, make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.profiles import find_profile
@@ -113,7 +113,7 @@ def _policies(
     from marl_airhockey.system_id.measure import fine_tuning_config, pretraining_config
 
     for name in names:
-        make_agent(name)
+        make_driver(name)
     names = list(names)
     if not names:
         for kind in profiles:
@@ -128,7 +128,7 @@ def _policies(
     policies: dict[str, Driver] = {}
     for name in names:
         short = Path(name).name if Path(name).exists() else name
-        policies[name if short in policies else short] = make_agent(name)
+        policies[name if short in policies else short] = make_driver(name)
     return policies
 
 

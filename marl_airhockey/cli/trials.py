@@ -31,7 +31,7 @@ from marl_airhockey.cli.real_table import (
     real_table,
 )
 from marl_airhockey.data.files import is_recording
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -87,7 +87,7 @@ def trials(
         _compare_recordings(recorded, as_json)
         return
     drivers = {
-        name: [make_agent(path) for path in paths] for name, paths in methods.items()
+        name: [make_driver(path) for path in paths] for name, paths in methods.items()
     }
     keywords = environment(backend, profile, option, other, physics)
     players = {

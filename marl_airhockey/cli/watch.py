@@ -29,7 +29,7 @@ from marl_airhockey.cli.real_table import (
     real_table,
 )
 from marl_airhockey.data.files import is_recording
-from marl_airhockey.registry import DEFAULT_BACKEND, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
 
 
 def watch(
@@ -79,7 +79,7 @@ def watch(
     )
     name = name_on_table(driver, backend)
     game, keywords, players = as_trained_unless_given(
-        {name: make_agent(name)}, scenario, keywords
+        {name: make_driver(name)}, scenario, keywords
     )
     with real_table(keywords, lab, rig) as table:
         show_episodes(

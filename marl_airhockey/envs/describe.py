@@ -14,8 +14,8 @@ from marl_airhockey.build import build_world
 from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
 from marl_airhockey.registry import (
-    agent_names,
     backend_names,
+    driver_names,
     find_scenario,
     make_scenario,
     plugin_names,
@@ -63,7 +63,7 @@ def summary() -> dict[str, Any]:
         )
     return {
         "scenarios": rows,
-        "drivers": [*agent_names(), *plugin_names("drivers")],
+        "drivers": [*driver_names(), *plugin_names("drivers")],
         "zoo": zoo_names(),
         "backends": backend_names(),
         "profiles": list(PROFILES),

@@ -15,7 +15,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.policies.load import ZOO
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 TASKS = (
     "reach",
@@ -84,10 +84,10 @@ def play_challenge(
     """
     results, files = [], {}
     cells = [(t, p, "") for p in PROFILES for t in TASKS]
-    cells += [("duel", "ideal", rival) for rival in FIELD]
-    for scenario, profile, rival in cells:
+    cells += [("duel", "ideal", opponent) for opponent in FIELD]
+    for scenario, profile, opponent in cells:
         player = find_player(given, scenario, profile)
-        result = _play(scenario, profile, rival, player, episodes, games)
+        result = _play(scenario, profile, opponent, player, episodes, games)
         if result.player and Path(player).is_file():
             digest = hashlib.sha256(Path(player).read_bytes()).hexdigest()
             files[Path(player).name] = digest
@@ -99,23 +99,25 @@ def play_challenge(
 
 
 def _play(
-    scenario: str, profile: str, rival: str, player: str, episodes: int, games: int
+    scenario: str, profile: str, opponent: str, player: str, episodes: int, games: int
 ) -> Result:
     """Play one task in one profile, or one opponent."""
 
     def missing(note: str) -> Result:
-        return Result(scenario, profile, rival, "", 0.0, 0.0, 0.0, 0.0, "", note)
+        return Result(scenario, profile, opponent, "", 0.0, 0.0, 0.0, 0.0, "", note)
 
     if not player:
         return missing("no policy of this name")
     shown = Path(player).name
     try:
-        driver = make_agent(player)
-        if rival:
-            found, _ = play_against(scenario, driver, [make_agent(rival)], games, SEED)
+        driver = make_driver(player)
+        if opponent:
+            found, _ = play_against(
+                scenario, driver, [make_driver(opponent)], games, SEED
+            )
             score = float(found[0])
             ends = interval(score, games)
-            return Result(scenario, profile, rival, shown, score, *ends, 0.0, "", "")
+            return Result(scenario, profile, opponent, shown, score, *ends, 0.0, "", "")
         task = evaluate(
             driver,
             scenario,

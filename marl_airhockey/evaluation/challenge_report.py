@@ -20,7 +20,7 @@ class Result:
 
     scenario: str
     profile: str
-    rival: str
+    opponent: str
     """Opponent; "" in a task"""
     player: str
     """Who played; "" if nobody did"""
@@ -56,7 +56,7 @@ class ChallengeReport:
     @property
     def profiles(self) -> list[str]:
         """Profiles in which tasks were played."""
-        return list(dict.fromkeys(r.profile for r in self.results if not r.rival))
+        return list(dict.fromkeys(r.profile for r in self.results if not r.opponent))
 
     def total(self, keep: Callable[[Result], bool]) -> tuple[float, float, float]:
         """Return the mean score of some results, and its 95 % interval.
@@ -76,8 +76,8 @@ class ChallengeReport:
         for profile in self.profiles:
             in_it = partial(_is_task, profile=profile)
             found[profile] = self.total(in_it)
-        found["tasks"] = self.total(lambda r: not r.rival)
-        found["duel"] = self.total(lambda r: bool(r.rival))
+        found["tasks"] = self.total(lambda r: not r.opponent)
+        found["duel"] = self.total(lambda r: bool(r.opponent))
         return found
 
     def to_json(self) -> str:
@@ -127,13 +127,13 @@ class ChallengeReport:
             f"| {r.scenario} | {r.profile} | {r.player or r.note} | {_share(r)} | "
             f"{r.first_shot:.3f} | {r.deployability} |"
             for r in self.results
-            if not r.rival
+            if not r.opponent
         ]
         lines += ["", "| duel against | player | score (95 %) |", "| --- " * 3 + "|"]
         lines += [
-            f"| {r.rival} | {r.player or r.note} | {_share(r)} |"
+            f"| {r.opponent} | {r.player or r.note} | {_share(r)} |"
             for r in self.results
-            if r.rival
+            if r.opponent
         ]
         return "\n".join(lines) + "\n"
 
@@ -148,7 +148,7 @@ class ChallengeReport:
 
 
 def _is_task(result: Result, profile: str) -> bool:
-    return not result.rival and result.profile == profile
+    return not result.opponent and result.profile == profile
 
 
 def _share(result: Result) -> str:
@@ -161,13 +161,15 @@ def plot_card(card: ChallengeReport, path: Path) -> None:
 
     from marl_airhockey.sim.render.charts import DPI, INK, INKS, save
 
-    tasks = list(dict.fromkeys(r.scenario for r in card.results if not r.rival))
+    tasks = list(dict.fromkeys(r.scenario for r in card.results if not r.opponent))
     angles = np.linspace(0.0, 2.0 * np.pi, len(tasks), endpoint=False)
     figure, axes = plt.subplots(
         figsize=(6.4, 6.0), dpi=DPI, layout="constrained", subplot_kw={"polar": True}
     )
     for profile, ink in zip(card.profiles, (INK, *INKS), strict=False):
-        share = [r.score for r in card.results if not r.rival and r.profile == profile]
+        share = [
+            r.score for r in card.results if not r.opponent and r.profile == profile
+        ]
         axes.plot([*angles, angles[0]], [*share, share[0]], color=ink, label=profile)
     axes.set_ylim(0.0, 1.0)
     axes.set_xticks(angles, [task.replace("_", "\n") for task in tasks], size=8)

@@ -1,4 +1,4 @@
-"""Cross-play: how well players do with mates that they were not trained with."""
+"""Cross-play: how well players do with teammates that they were not trained with."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from marl_airhockey.types import Array
 
 @dataclass(frozen=True)
 class CrossPlay:
-    """Results of E players in teams: the row's at ``paddle_0``, the column's its mates.
+    """Results of E players in teams.
+
+    The row's player is at ``paddle_0``, the column's are its teammates.
 
     On the diagonal a player meets itself (self-play).
     """
@@ -83,13 +85,13 @@ def crossplay(
     report: Callable[[int], None] = lambda pairs: None,
     **keywords: Unpack[Keywords],
 ) -> CrossPlay:
-    """Let every player play with every other as its mate, and with itself.
+    """Let every player play with every other as its teammate, and with itself.
 
     What is not given is that of the policies' training, which must agree.
 
     Args:
         scenario: Name of a game whose first team has two seats or more.
-        players: Players by name, see `registry.make_agent`, two at least; or their
+        players: Players by name, see `registry.make_driver`, two at least; or their
             names alone.
         episodes: Number of episodes of each pair, with the same seeds for all.
         seed: Seed of the first one.
@@ -104,14 +106,14 @@ def crossplay(
     if len(drivers) < 2:
         raise ValueError("cross-play needs at least two players, of different names")
     seats = scenario_of(scenario, keywords).scene.seats
-    mates = [i for i, s in enumerate(seats) if i and s.team == seats[0].team]
-    if not mates:
+    teammates = [i for i, s in enumerate(seats) if i and s.team == seats[0].team]
+    if not teammates:
         raise ValueError(f"{scenario!r} has no team of two seats or more")
     count, others = len(drivers), keywords.get("drivers", {})
     returns, success = np.empty((2, count, count))
     for i, (name, player) in enumerate(drivers.items()):
-        for j, mate in enumerate(drivers.values()):
-            team = {f"paddle_{k}": mate for k in mates}
+        for j, teammate in enumerate(drivers.values()):
+            team = {f"paddle_{k}": teammate for k in teammates}
             seated: Keywords = {**keywords, "drivers": {**others, **team}}
             found = evaluate(
                 player,

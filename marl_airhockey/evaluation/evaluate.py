@@ -17,7 +17,7 @@ from marl_airhockey.evaluation.comparison import Outcomes
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_driver
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.columns import head_of
 from marl_airhockey.rollout.rollout import play_episodes
@@ -99,7 +99,7 @@ def evaluate(
     batch; on a real table they follow each other.
 
     Args:
-        player: Driver, or what makes one, see `registry.make_agent`.
+        player: Driver, or what makes one, see `registry.make_driver`.
         scenario: Scenario, see `registry.find_scenario`; None for that of training.
         episodes: Number of episodes; episode i is the first of world i, with seed + i.
         seed: Seed of the first episode; training never sees those from 2,000,000 on.
@@ -113,7 +113,7 @@ def evaluate(
             that is nan, named.
     """
     episodes, seed = check_count("episodes", episodes), check_seed(seed)
-    driver, keywords = make_agent(player), table_keywords(keywords)
+    driver, keywords = make_driver(player), table_keywords(keywords)
     name = name or name_of(player, driver)
     if not exact:
         scenario, keywords = as_trained({name: driver}, scenario, keywords)

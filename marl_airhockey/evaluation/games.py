@@ -63,31 +63,31 @@ def teams_of(seats: Sequence[int]) -> Array:
 def play_against(
     scenario: str,
     player: Driver,
-    rivals: Sequence[Driver],
+    opponents: Sequence[Driver],
     games: int,
     seed: int,
     keywords: Keywords | None = None,
 ) -> tuple[Array, Array]:
-    """Let one player play each of R rivals, who play for all other teams.
+    """Let one player play each of R opponents, who play for all other teams.
 
     Args:
         scenario: name of a game.
         player: driver; it changes ends from game to game.
-        rivals: drivers.
+        opponents: drivers.
         games: number of games against each.
         seed: seed of the first game.
         keywords: keywords of the environment.
 
     Returns:
-        The player's mean score and mean margin against each rival, (R,) each.
+        The player's mean score and mean margin against each opponent, (R,) each.
     """
     keywords = keywords or {}
     scene = scenario_of(scenario, keywords).scene
     teams = int(teams_of([seat.team for seat in scene.seats]).max()) + 1
-    rows = np.arange(1, len(rivals) + 1).repeat(games)
+    rows = np.arange(1, len(opponents) + 1).repeat(games)
     lineups = rows[:, None].repeat(teams, axis=1)
     lineups[np.arange(len(rows)), np.arange(len(rows)) % teams] = 0
-    results = play_games(scenario, [player, *rivals], lineups, seed, keywords)
+    results = play_games(scenario, [player, *opponents], lineups, seed, keywords)
     score, margin = results.score[lineups == 0], results.margin[lineups == 0]
     return score.reshape(-1, games).mean(-1), margin.reshape(-1, games).mean(-1)
 

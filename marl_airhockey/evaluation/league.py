@@ -42,7 +42,7 @@ def league(
 
     Args:
         scenario: Name of a game of two sides or more.
-        players: Players by name, see `registry.make_agent`, two at least; or their
+        players: Players by name, see `registry.make_driver`, two at least; or their
             names alone.
         games: Number of games of each pair, on average if there are more than two
             sides; of two, they change ends at half of them.

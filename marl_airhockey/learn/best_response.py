@@ -10,7 +10,7 @@ from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.settings import load_config
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.world.keywords import Keywords
 
 GAMES = 400
@@ -50,11 +50,11 @@ def best_response(
     if (folder / "state.json").exists():
         load_config(PPOConfig, folder / "config.toml")
     else:
-        only = {"opponents": [player], "rivals": [player]}
+        only = {"opponents": [player], "eval_opponents": [player]}
         alone = {"self_play_fraction": 0.0, "scripted_fraction": 1.0, "snapshots": 1}
         length = {"total_steps": steps, "seed": seed, "evaluations": 4}
         run_training(preset(scenario, {**only, **alone, **length}), folder, report)
-    response, rivals = load_policy(folder / "last.npz"), [make_agent(player)]
+    response, opponents = load_policy(folder / "last.npz"), [make_driver(player)]
     keywords: Keywords = {"backend": "numba"}
-    score, _ = play_against(scenario, response, rivals, GAMES, SEED, keywords)
+    score, _ = play_against(scenario, response, opponents, GAMES, SEED, keywords)
     return float(score[0])

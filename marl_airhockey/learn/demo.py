@@ -14,7 +14,7 @@ from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import run_training, versions
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.rollout.watch import show_episodes
 
 BESIDE = ("still", "random", "striker")
@@ -48,7 +48,7 @@ def run_demo(
     steps = steps or min(config.total_steps, MOST_STEPS)
     last = run_training(replace(config, total_steps=steps), folder, report)
     policy = load_policy(folder)
-    drivers = {name: make_agent(name) for name in BESIDE} | {"learned": policy}
+    drivers = {name: make_driver(name) for name in BESIDE} | {"learned": policy}
     results = [
         evaluate(d, scenario, name=name, exact=True) for name, d in drivers.items()
     ]

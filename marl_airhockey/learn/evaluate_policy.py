@@ -8,7 +8,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -56,12 +56,12 @@ def _scores(make: DriverFactory, config: SelfPlayConfig) -> Metrics:
     score, margin = play_against(
         config.scenario,
         make(True),
-        [make_agent(rival) for rival in config.rivals],
+        [make_driver(opponent) for opponent in config.eval_opponents],
         config.eval_episodes,
         EVAL_SEED,
         keywords,
     )
     metrics = {"score": float(score.mean()), "return": float(margin.mean())}
-    for rival, share in zip(config.rivals, score.tolist(), strict=True):
-        metrics[f"score/{rival}"] = share
+    for opponent, share in zip(config.eval_opponents, score.tolist(), strict=True):
+        metrics[f"score/{opponent}"] = share
     return metrics

@@ -26,13 +26,13 @@ from marl_airhockey.learn.run import Progress
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import Policy, policy_driver, trained_in
-from marl_airhockey.registry import find_scenario, make_agent
+from marl_airhockey.registry import find_scenario, make_driver
 from marl_airhockey.sim.core.errors import require
 
 EPISODES = 1000
 """Episodes by which a task's policy is measured"""
 GAMES = 200
-"""Games against each rival by which a game's policy is measured"""
+"""Games against each opponent by which a game's policy is measured"""
 
 
 def export_policy(run: Path, out: Path, checkpoint: Path | None = None) -> NumpyPolicy:
@@ -113,7 +113,7 @@ def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
     score, _ = play_against(
         config.scenario,
         policy,
-        [make_agent(rival) for rival in config.rivals],
+        [make_driver(opponent) for opponent in config.eval_opponents],
         GAMES,
         TEST_SEED,
         {**config.keywords, "drivers": {}},
@@ -121,8 +121,10 @@ def _games(policy: Policy, config: PPOConfig) -> dict[str, Any]:
     return {
         "games_of_each": GAMES,
         "score": {
-            rival: [share, *interval(share, GAMES)]
-            for rival, share in zip(config.rivals, score.tolist(), strict=True)
+            opponent: [share, *interval(share, GAMES)]
+            for opponent, share in zip(
+                config.eval_opponents, score.tolist(), strict=True
+            )
         },
     }
 

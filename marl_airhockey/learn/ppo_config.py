@@ -144,7 +144,7 @@ EVALUATION_SHARE = 0.2
 EVALUATION_COST = 1.5
 """CPU time of a control step of an evaluation's game, in steps of learning"""
 FEWEST_GAMES = 20
-"""Games against each rival below which there are fewer evaluations instead"""
+"""Games against each opponent below which there are fewer evaluations instead"""
 
 
 def _evaluations(config: PPOConfig, changes: Mapping[str, Any]) -> tuple[int, int]:
@@ -156,7 +156,7 @@ def _evaluations(config: PPOConfig, changes: Mapping[str, Any]) -> tuple[int, in
     if not config.self_play:
         return number, each
     game = find_scenario(config.scenario, **config.options)
-    steps = game.seconds / config.control_dt * len(config.rivals)
+    steps = game.seconds / config.control_dt * len(config.eval_opponents)
     games = EVALUATION_SHARE * config.total_steps / (EVALUATION_COST * steps)
     if "evaluations" not in changes:
         number = min(number, max(int(games / FEWEST_GAMES), 1))

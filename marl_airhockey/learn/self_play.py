@@ -12,7 +12,7 @@ from marl_airhockey.learn.action_penalty import ActionPenalty
 from marl_airhockey.learn.self_play_config import SelfPlayConfig
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.policy import policy_driver
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.world.roster import Roster
 from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.types import Array
@@ -37,7 +37,7 @@ class SelfPlayEnv(SlotEnv):
     """
 
     def __init__(self, config: SelfPlayConfig, num_worlds: int, folder: Path) -> None:
-        scripted = {name: make_agent(name) for name in config.opponents}
+        scripted = {name: make_driver(name) for name in config.opponents}
         forms = [driver.observe for driver in scripted.values() if driver.observe]
         keywords = config.training_keywords
         super().__init__(config.scenario, num_worlds, forms, **keywords)
@@ -57,10 +57,12 @@ class SelfPlayEnv(SlotEnv):
         self._snapshots: list[Path] = []
         mirrored = np.arange(self._mirrored)
         others = np.arange(self._mirrored, num_worlds)
-        seats, mates = len(scene.seats), self._members.shape[1]
-        self._rows = np.concatenate([mirrored.repeat(seats), others.repeat(mates)])
+        seats, teammates = len(scene.seats), self._members.shape[1]
+        self._rows = np.concatenate([mirrored.repeat(seats), others.repeat(teammates)])
         self._seats = np.tile(np.arange(seats), len(mirrored))
-        self._seats = np.concatenate([self._seats, np.zeros(len(others) * mates, int)])
+        self._seats = np.concatenate(
+            [self._seats, np.zeros(len(others) * teammates, int)]
+        )
         self._learner = np.zeros(num_worlds, np.int64)
         self.num_envs = len(self._rows)
         self._returns = np.zeros(self.num_envs)
@@ -133,9 +135,9 @@ class SelfPlayEnv(SlotEnv):
         mine = self._members[self._learner[worlds]]
         seated[worlds[:, None], mine] = -1
         slots = self._mirrored * len(self._teams)
-        mates = self._members.shape[1]
-        first = slots + (worlds - self._mirrored) * mates
-        self._seats[first[:, None] + np.arange(mates)] = mine
+        teammates = self._members.shape[1]
+        first = slots + (worlds - self._mirrored) * teammates
+        self._seats[first[:, None] + np.arange(teammates)] = mine
         self._roster.begin(worlds)
 
     def _restarted(self, worlds: Array, last: StepResult) -> None:

@@ -11,7 +11,7 @@ from marl_airhockey.registry import find_scenario
 from marl_airhockey.sim.world.keywords import Keywords
 
 OPPONENTS = ("random", "goalkeeper", "striker", "allround", "allround:strength=fair")
-RIVALS = ("random", "goalkeeper", "striker", "allround")
+EVAL_OPPONENTS = ("random", "goalkeeper", "striker", "allround")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class SelfPlayConfig(RunConfig):
         "pool",
         "opponent_sampling_exponent",
         "opponent_speed_range",
-        "rivals",
+        "eval_opponents",
     )
     """Names of the settings of games alone"""
 
@@ -69,7 +69,7 @@ class SelfPlayConfig(RunConfig):
     opponent_speed_range: list[float] = field(default_factory=lambda: [0.1, 1.0])
     """Range of the share of their commanded speed at which opponents move in half of
     the games, so that the learner sometimes scores against good ones"""
-    rivals: list[str] = field(default_factory=lambda: list(RIVALS))
+    eval_opponents: list[str] = field(default_factory=lambda: list(EVAL_OPPONENTS))
     """Drivers that evaluations of games are against"""
 
     def __post_init__(self) -> None:

@@ -69,7 +69,7 @@ def load_config(kind: type[C], path: Path) -> C:
 def _refuse_code(path: Path, data: Mapping[str, Any]) -> None:
     """Ask before a configuration, maybe somebody else's, runs code that it names."""
     named = [data.get("scenario", ""), *dict(data.get("drivers", {})).values()]
-    named += [*data.get("opponents", []), *data.get("rivals", [])]
+    named += [*data.get("opponents", []), *data.get("eval_opponents", [])]
     found = [t for t in map(str, named) if runs_code(t) and not is_trusted_code(t)]
     if found:
         require_trust(path, code=f"the name of Python code, {found[0]}")

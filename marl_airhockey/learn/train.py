@@ -33,7 +33,7 @@ from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import Config, ProgressCallback, TrainingRun
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.trust import trust_code
-from marl_airhockey.registry import find_scenario, make_agent
+from marl_airhockey.registry import find_scenario, make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.core.errors import require, unknown_name
 
@@ -183,8 +183,8 @@ def _continuation(
         raise ValueError(unknown_name("engine", config.engine, ENGINES))
     engine = ENGINES[config.engine]()
     if config.self_play:  # Refused now, not at the first evaluation.
-        for name in {*config.opponents, *config.rivals}:
-            make_agent(name)
+        for name in {*config.opponents, *config.eval_opponents}:
+            make_driver(name)
     return lambda: _go_on(engine, TrainingRun(config, folder, report))
 
 

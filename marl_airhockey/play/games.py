@@ -124,7 +124,7 @@ def _game(path: Path) -> Game:
 def _players(head: Mapping[str, Any]) -> Iterable[Player]:
     """Yield the players of a head.
 
-    A program is named as the plan of a study names it; elsewhere with its handicap.
+    A driver is named as the plan of a study names it; elsewhere with its handicap.
     """
     label = _table(head, "study").get("opponent")
     handicap = Handicap(**_table(head, "handicap")).caption
@@ -133,8 +133,8 @@ def _players(head: Mapping[str, Any]) -> Iterable[Player]:
         raise ValueError("it does not name its players")
     for row in rows:
         person, driver = row.get("person"), str(row.get("driver"))
-        program = f"{driver} ({handicap})" if handicap else driver
-        yield Player(str(person or label or program), person is not None)
+        shown = f"{driver} ({handicap})" if handicap else driver
+        yield Player(str(person or label or shown), person is not None)
 
 
 def _result(

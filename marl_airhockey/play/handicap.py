@@ -1,4 +1,4 @@
-"""Handicaps: programs made as late, as unsteady and as slow as people."""
+"""Handicaps: drivers that are limited to human latency, precision and speed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BOUNDS = {"reaction": (0.0, 0.3), "noise": (0.0, 1.0), "pace": (0.05, 1.0)}
 
 @dataclass(frozen=True)
 class Handicap:
-    """Limits on what a program can do; the defaults are no limits.
+    """Limits of a driver; the defaults are no limits.
 
     Raises:
         ValueError: a value outside `BOUNDS`; names the field.
@@ -62,7 +62,7 @@ PRESETS = {
 }
 """Handicaps that a page offers, the one without limits first."""
 USUAL = "human speed"
-"""Handicap of programs that play against people who have not chosen another one."""
+"""Handicap of drivers that play against people who have not chosen another one."""
 
 
 @dataclass

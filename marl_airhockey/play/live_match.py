@@ -35,7 +35,7 @@ class LiveMatch:
         scenario: its name.
         drivers: by agent: `PERSON`, or a driver's name or path; people elsewhere.
         keywords: of the environment, without drivers.
-        handicap: of all programs; None for no limits.
+        handicap: Of all drivers that are no people; None for no limits.
         seed: of the first episode.
 
     Raises:
@@ -95,12 +95,12 @@ class LiveMatch:
         return self.world.scene.seats
 
     @property
-    def has_rivals(self) -> bool:
-        """True if people play against programs."""
+    def has_opponents(self) -> bool:
+        """True if people play against other drivers."""
         rows = list(zip(self.seats, self.drivers.names, strict=True))
         people = {seat.team for seat, name in rows if name == PERSON}
-        programs = {seat.team for seat, name in rows if name != PERSON}
-        return bool(people and programs - people)
+        others = {seat.team for seat, name in rows if name != PERSON}
+        return bool(people and others - people)
 
     @property
     def _decided_by(self) -> str:
@@ -127,7 +127,7 @@ class LiveMatch:
             self.drivers.reset([i])
 
     def substitute(self, i: int) -> None:
-        """Let a program take over a seat, in a match too: a fitting policy or a script.
+        """Let a driver take over a seat, in a match too: a fitting policy or a script.
 
         Raises:
             ValueError: It does not fit.
@@ -147,7 +147,7 @@ class LiveMatch:
             self.phase, self.reason = "lobby", ""
 
     def set_handicap(self, handicap: Handicap) -> None:
-        """Limit all programs, from the next match on.
+        """Limit all drivers that are no people, from the next match on.
 
         Raises:
             ValueError: during a match.

@@ -1,4 +1,4 @@
-"""Drivers of a match: people by their input devices, and programs."""
+"""Drivers of a match: people by their input devices, policies, scripts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.policies.load import ZOO, policy_file
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.registry import (
-    make_agent,
+    independent_driver_names,
+    make_driver,
     make_scenario,
-    program_names,
     zoo_names,
 )
 from marl_airhockey.sim.contracts.driver import Driver
@@ -35,7 +35,7 @@ class MatchDrivers:
     Args:
         world: of one row.
         profile: of the world, by which fitting policies are sorted.
-        handicap: of all programs.
+        handicap: Of all drivers that are no people.
     """
 
     def __init__(self, world: World, profile: str, handicap: Handicap) -> None:
@@ -46,18 +46,18 @@ class MatchDrivers:
         self._device_kinds = ["mouse" for _ in seats]
         lag = ARM_LAG if world.backend.senses_itself else 0.0
         self._by_kind = {"mouse": f"mouse:lag={lag}", "gamepad": "gamepad"}
-        self._devices = [make_agent(self._by_kind["mouse"]) for _ in seats]
+        self._devices = [make_driver(self._by_kind["mouse"]) for _ in seats]
         self._driven = [self._build(i) for i in range(len(seats))]
 
     @property
     def choices(self) -> list[str]:
-        """Names of programs to choose from: fitting policies, then scripts."""
-        programs = {name: make_agent(name) for name in program_names()}
+        """Names of drivers to choose from: fitting policies, then scripts."""
+        known = {name: make_driver(name) for name in independent_driver_names()}
         goal = isinstance(self._world.scenario, GoalScenario)
         real = self._world.backend.senses_itself
         scripts = [
             name
-            for name, driver in programs.items()
+            for name, driver in known.items()
             if (goal or not driver.needs_goal) and not (real and driver.erratic)
         ]
         if len(self.names) > 1:
@@ -126,7 +126,7 @@ class MatchDrivers:
         """Return the driver by which a person steers a seat: "mouse" or "gamepad"."""
         if self.names[i] == PERSON and self._device_kinds[i] != kind:
             self._device_kinds[i] = kind
-            self._devices[i] = make_agent(self._by_kind[kind])
+            self._devices[i] = make_driver(self._by_kind[kind])
             self._driven[i] = self._build(i)
             self.reset([i])
         return self._devices[i]
@@ -172,11 +172,11 @@ class MatchDrivers:
             seat.driver.__exit__(None, None, None)
 
     def _build(self, i: int) -> DrivenSeat:
-        """Return a seat's driver, with the handicap if it is a program's."""
+        """Return a seat's driver, with the handicap unless it is a person."""
         name, world = self.names[i], self._world
         driver = self._devices[i]
         if name != PERSON:
-            driver = make_agent(name)
+            driver = make_driver(name)
             if driver.needs_person and not driver.needs_device:
                 raise ValueError(f"{name} is a person's input device: say {PERSON}")
             refuse_erratic(f"paddle_{i}", driver, world.backend)

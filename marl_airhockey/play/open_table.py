@@ -146,7 +146,7 @@ class OpenTable(Host):
             self.match.abort("broken off by a player")
 
     def _substitute(self, client: Client) -> None:
-        """Let programs take over the seats that people have left, and go on."""
+        """Let drivers take over the seats that people have left, and go on."""
         if client.seat is None or self.match.phase != "pause":
             return
         for seat in self.seats.free:

@@ -26,7 +26,7 @@ from marl_airhockey.play.measures import Player
 from marl_airhockey.types import Array
 
 MOST_GROUPS = 60
-"""Most groups of games that an interval of programs alone is made of"""
+"""Most groups of games that an interval without people is made of"""
 NAN = float("nan")
 HEADER = (
     *("player", "games", "people", "score (95 %)", "Elo (95 %)", "pucks hit (95 %)"),
@@ -36,9 +36,9 @@ LEGEND = (
     "Score: win + draw / 2, of games played to the end. Shots: pucks that left the "
     "paddle toward the other end; their interquartile mean speed, and the deviation of "
     "where they would reach that end. At limits: share of the steps whose action "
-    "exceeded speed, acceleration or reach. Intervals of a program are over the people "
+    "exceeded speed, acceleration or reach. Intervals of a driver are over the people "
     "that it met, as the games of a person are not independent; those of a person, and "
-    f"of programs among themselves, over games; none of fewer than {FEWEST_GROUPS}."
+    f"of drivers among themselves, over games; none of fewer than {FEWEST_GROUPS}."
 )
 
 

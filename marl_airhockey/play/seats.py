@@ -40,7 +40,7 @@ class Seats:
 
     @property
     def players(self) -> list[dict[str, Any]]:
-        """Driver, person's pseudonym and consent of each seat; None for programs."""
+        """Driver, person's pseudonym and consent of each seat; None for others."""
         people = {c.seat: (c.name, c.consent) for c in self.clients}
         rows = []
         for i, driver in enumerate(self.match.drivers.names):
@@ -52,7 +52,7 @@ class Seats:
 
     @property
     def devices(self) -> list[dict[str, Any] | None]:
-        """What the page at each seat says of its devices; None for programs."""
+        """What the page at each seat says of its devices; None for others."""
         found = {c.seat: c.device for c in self.clients}
         return [found.get(i) for i in range(len(self.match.seats))]
 
@@ -71,7 +71,7 @@ class Seats:
         return {"round_trip": trips, "pointer": pointers}
 
     def may_control(self, client: Client) -> bool:
-        """Return True for pages with a seat, and for all if only programs play."""
+        """Return True for pages with a seat, and for all if no people play."""
         return client.seat is not None or PERSON not in self.match.drivers.names
 
     def take(self, client: Client, seat: int) -> None:

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from marl_airhockey.policies.policy import Policy
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
-from marl_airhockey.registry import find_scenario, make_agent, runs_code
+from marl_airhockey.registry import find_scenario, make_driver, runs_code
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.world.keywords import Keywords
@@ -156,7 +156,7 @@ def seated_players(
     """Return the drivers of players, by name, and the keywords of their environment.
 
     Args:
-        players: Players by name, see `registry.make_agent`; or their names alone.
+        players: Players by name, see `registry.make_driver`; or their names alone.
         scenario: Scenario that they play.
         keywords: Keywords that are given.
         exact: Whether the others have their defaults, instead of those of training.
@@ -167,7 +167,7 @@ def seated_players(
     if isinstance(players, str):
         raise ValueError(f"players: a list of names is expected, got {players!r}")
     named = players if isinstance(players, Mapping) else {n: n for n in players}
-    drivers = {name: make_agent(player) for name, player in named.items()}
+    drivers = {name: make_driver(player) for name, player in named.items()}
     if exact:
         return drivers, keywords
     _, keywords = as_trained(drivers, scenario, keywords)

@@ -8,7 +8,7 @@ from typing import Unpack
 import numpy as np
 
 from marl_airhockey.build import build_driven_world, table_keywords
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_agent
+from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_driver
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.collector import Collector
 from marl_airhockey.rollout.columns import step_columns
@@ -41,7 +41,7 @@ def rollout(
     ``episode.columns["reward"]``, (T, seats), what came of each step.
 
     Args:
-        player: Driver, or what makes one, see `registry.make_agent`.
+        player: Driver, or what makes one, see `registry.make_driver`.
         scenario: Scenario, see `registry.find_scenario`; None for that of training.
         episodes: Number of episodes; episode i has the seed ``seed + i``.
         seed: Seed of the first episode.
@@ -54,7 +54,7 @@ def rollout(
             or a reward term that is nan; named.
     """
     episodes, seed = check_count("episodes", episodes), check_seed(seed)
-    driver, keywords = make_agent(player), table_keywords(keywords)
+    driver, keywords = make_driver(player), table_keywords(keywords)
     scenario, keywords = as_trained({"player": driver}, scenario, keywords)
     driver = seen_in(driver, keywords)
     # On a real table episodes follow each other; elsewhere many are played at once.

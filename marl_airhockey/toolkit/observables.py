@@ -59,7 +59,7 @@ class OwnPaddle(Observable):
 
 @dataclass(frozen=True)
 class OtherPaddles(Observable):
-    """Positions and velocities of the other paddles, mates first, by ego angle."""
+    """Positions and velocities of the other paddles, teammates first, by ego angle."""
 
     def columns(self, scope: ObservationContext) -> list[Column]:
         columns = []
@@ -80,7 +80,7 @@ class OtherPaddles(Observable):
 
 
 def _others(scene: Scene) -> Array:
-    """(S, S - 1) indices of the other seats: mates, then opponents, by ego angle."""
+    """(S, S - 1) indices of other seats: teammates, then opponents, by ego angle."""
     angles = np.arctan2(*scene.table.normals.T[::-1])
     rows = []
     for me, seat in enumerate(scene.seats):

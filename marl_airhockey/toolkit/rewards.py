@@ -185,7 +185,7 @@ def last_toucher(who: Array, after: State) -> Array:
 
 
 def held(scene: Scene, t: Transition) -> Array:
-    """(..., seats, pucks) time a puck has been in reach of a seat or its mates, s.
+    """(..., seats, pucks) time a puck has been in reach of a seat or its teammates, s.
 
     It continues ``held`` of the memory.
     """

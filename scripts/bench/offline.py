@@ -26,7 +26,7 @@ from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer
 from torchrl.modules import MLP, IndependentNormal, ProbabilisticActor, ValueOperator
 from torchrl.objectives import IQLLoss, SoftUpdate
 
-from marl_airhockey import make_agent
+from marl_airhockey import make_driver
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.offline.dataset import Batch, load_dataset
@@ -109,7 +109,7 @@ def main(
     torch.set_num_threads(1)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording"
-        record_episodes(make_agent("zoo/juggle"), "zoo", "juggle", 64, path, 0, {})
+        record_episodes(make_driver("zoo/juggle"), "zoo", "juggle", 64, path, 0, {})
         ours = make_ours(path, Path(folder))
         theirs = make_theirs(load_dataset([path], 0, 1.0, 0.99, 13).steps)
         cost_of(ours, 20)

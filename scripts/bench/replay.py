@@ -31,7 +31,7 @@ def replayed(name: str, profile: str, episodes: int, folder: Path) -> str:
     keywords: Keywords = {"max_cycles": 160, "drivers": drivers, "profile": profile}
     path = folder / f"{name}-{profile}"
     began = time.process_time()
-    record_episodes(ah.make_agent(driver), driver, name, episodes, path, 7, keywords)
+    record_episodes(ah.make_driver(driver), driver, name, episodes, path, 7, keywords)
     largest = max(replay_differences(path).values())
     steps, spent = summarize_recording(path).steps, time.process_time() - began
     return f"| {name} | {profile} | {steps} | {largest:.1e} | {spent:.0f} |"

@@ -31,7 +31,7 @@ from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.self_play_config import OPPONENTS
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.render.charts import DPI, INK, INKS, save, tidy
 from marl_airhockey.sim.world.keywords import Keywords
@@ -65,10 +65,10 @@ def competitive_table(game: str, folders: Sequence[Path]) -> Table:
     table = Table("against", "in training", *[f"seed {i}" for i in range(len(folders))])
     columns = []
     for folder in folders:
-        rivals: list[Driver] = [make_agent(name) for name in SCRIPTS]
-        rivals.append(load_policy(checkpoint(folder, 0.1)))
+        opponents: list[Driver] = [make_driver(name) for name in SCRIPTS]
+        opponents.append(load_policy(checkpoint(folder, 0.1)))
         policy = load_policy(folder / "last.npz")
-        score, _ = play_against(game, policy, rivals, GAMES, SEED, ON_NUMBA)
+        score, _ = play_against(game, policy, opponents, GAMES, SEED, ON_NUMBA)
         columns.append(score)
     for i, name in enumerate(names):
         cells = []
@@ -86,7 +86,7 @@ def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
     """Return returns and success of pairs."""
     table = Table("pair", "return", "success")
     players: dict[str, Driver] = {str(f): load_policy(f / "last.npz") for f in folders}
-    scripts = {name: make_agent(name) for name in ("striker", "allround")}
+    scripts = {name: make_driver(name) for name in ("striker", "allround")}
     learned = crossplay(
         game, players, episodes=GAMES, seed=SEED, exact=True, **ON_NUMBA
     )
@@ -108,7 +108,7 @@ def cooperative_table(game: str, folders: Sequence[Path]) -> Table:
 
 
 def plot_curves(game: str, folders: Sequence[Path], path: Path) -> None:
-    """Draw scores against rivals over CPU-minutes of training, by `plot_iqm`."""
+    """Draw scores against opponents over CPU-minutes of training, by `plot_iqm`."""
     runs = []
     for folder in folders:
         with (folder / "evaluations.csv").open() as file:

@@ -171,14 +171,14 @@ def train_cell(game: str, algorithm: str, seed: int, frames: int) -> Row:
 
 def play_script(game: str, name: str) -> Row:
     """Return the row of a team of scripts."""
-    mate = {"paddle_1": name, **GAMES[game].get("drivers", {})}
+    teammate = {"paddle_1": name, **GAMES[game].get("drivers", {})}
     result = evaluate(
-        ah.make_agent(name),
+        ah.make_driver(name),
         game,
         episodes=EPISODES,
         name=name,
         exact=True,
-        drivers=mate,
+        drivers=teammate,
     )
     values = game, name, "", 0, result.success, result.returns, 0.0
     return dict(zip(FIELDS, values, strict=True))

@@ -33,7 +33,7 @@ from typing import Annotated, Any
 import typer
 from rows import DATA, Again, Book, Row, RowsFile, in_folder, read, run_folder
 
-from marl_airhockey import make_agent
+from marl_airhockey import make_driver
 from marl_airhockey.data.benchmark.build import get_dataset
 from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.data.record import record_steps
@@ -80,7 +80,7 @@ class Domain:
 def _recorded(player: str, task: str, steps: int, folder: Path, env: Keywords) -> Path:
     """Return recordings of a policy, made now if they are not there."""
     if not folder.exists():
-        record_steps(make_agent(player), player, task, steps, folder, SEED, env)
+        record_steps(make_driver(player), player, task, steps, folder, SEED, env)
     return folder
 
 
@@ -172,7 +172,7 @@ def train_cell(
 ) -> Row:
     """Train one cell and return its row."""
     domain, steps, minutes = DOMAINS[name], 0, 0.0
-    player: Driver = make_agent("random")
+    player: Driver = make_driver("random")
     if column != "random":
         place = folder / f"{name}-{tier}-{task}-{column}-{seed}"
         if column == "rl":

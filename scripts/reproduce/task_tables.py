@@ -22,7 +22,7 @@ from rich.table import Table
 from rows import DATA, Row, read
 from tasks import EPISODES, THRESHOLDS, Rows, config_of
 
-from marl_airhockey import make_agent
+from marl_airhockey import make_driver
 from marl_airhockey.data.benchmark.catalogue import TASKS
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.stats import interval
@@ -53,7 +53,7 @@ def mean(rows: Rows, column: str) -> str:
 def baseline(agent: str, task: str, profile: str) -> str:
     """Return the success of a driver without skill."""
     keywords = config_of(task, profile, "", 0).keywords
-    driver = make_agent(agent)
+    driver = make_driver(agent)
     found = evaluate(
         driver, task, episodes=EPISODES, seed=0, name=agent, exact=True, **keywords
     )

@@ -1,4 +1,4 @@
-"""MAPPO in one file: mates share a policy, and a critic sees the true state.
+"""MAPPO in one file: teammates share a policy, and a critic sees the true state.
 
     python scripts/tutorials/mappo.py --updates 150
 
@@ -94,8 +94,8 @@ def main(
                 optimizer.step()
         if update % 10 == 9:
             print(f"{update + 1}: reward of a step {float(rewards.mean()):.4f}")
-    mates = dict.fromkeys((f"paddle_{i}" for i in world.open[1:]), policy)
-    found = ah.evaluate(policy, game, episodes=200, drivers=mates)
+    teammates = dict.fromkeys((f"paddle_{i}" for i in world.open[1:]), policy)
+    found = ah.evaluate(policy, game, episodes=200, drivers=teammates)
     print(f"return {found.returns:.2f}, success {found.success:.3f}")
 
 

@@ -30,7 +30,7 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.learn.rllib import start_ray
 from marl_airhockey.policies.policy import Policy
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 
 def make_duel(_: Any) -> ParallelPettingZooEnv:
@@ -94,9 +94,9 @@ def main(
     checkpoint = Path(tempfile.mkdtemp(prefix="duel-"))
     algorithm.save_to_path(str(checkpoint))
     algorithm.stop()
-    rivals = [make_agent("random")]
+    opponents = [make_driver("random")]
     score, _ = play_against(
-        "duel", load_driver(checkpoint, "p0"), rivals, games, 0, {"backend": "numba"}
+        "duel", load_driver(checkpoint, "p0"), opponents, games, 0, {"backend": "numba"}
     )
     print(f"{checkpoint}: p0 as a driver scores {score[0]:.3f} against random")
     ray.shutdown()

@@ -22,7 +22,7 @@ from stable_baselines3 import PPO
 
 from marl_airhockey import duel_v0
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 
 def make_vec_env(copies: int) -> Any:
@@ -75,8 +75,8 @@ def main(
     rate = model.num_timesteps / (time.perf_counter() - began)
     print(f"{model.num_timesteps:,} agent-steps at {rate:,.0f} per second")
     print("a game against itself:", watch(model, 0))
-    rivals, player = [make_agent("random")], make_agent(model)
-    score, margin = play_against("duel", player, rivals, games, 0, {})
+    opponents, player = [make_driver("random")], make_driver(model)
+    score, margin = play_against("duel", player, opponents, games, 0, {})
     print(f"score against random: {score[0]:.3f} ({margin[0]:+.2f} goals a game)")
 
 

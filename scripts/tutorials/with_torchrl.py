@@ -2,7 +2,7 @@
 
     python scripts/tutorials/with_torchrl.py --updates 20
 
-`make_torchrl` steps many worlds as one environment; the mates are one group, and the
+`make_torchrl` steps many worlds as one environment; teammates are one group, and the
 key ``state`` gives the critic what no agent sees alone.
 """
 

@@ -25,7 +25,7 @@ def process(*words, ok=True, cwd=None):
 def test_list_names_everything():
     data = json.loads(airhockey("list", "--json").stdout)
     assert [row["name"] for row in data["scenarios"]] == ah.scenario_names()
-    assert data["drivers"] == ah.agent_names()
+    assert data["drivers"] == ah.driver_names()
     text = airhockey("list").stdout
     assert all(name in text for name in ah.scenario_names())
 

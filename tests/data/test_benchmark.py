@@ -28,7 +28,7 @@ from marl_airhockey.data.benchmark.synthetic import SyntheticHuman
 from marl_airhockey.data.files import one_recording, recordings_in
 from marl_airhockey.data.reader import read_head
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 
 NAME = "airhockey/touch/medium-replay-v0"
@@ -151,9 +151,9 @@ def test_synthetic_human_acts_late(monkeypatch):
 
 def test_synthetic_human_is_worse_than_its_policy_and_better_than_chance():
     players = {
-        "expert": make_agent("zoo/strike"),
-        "synthetic": SyntheticHuman(make_agent("zoo/strike")),
-        "random": make_agent("random"),
+        "expert": make_driver("zoo/strike"),
+        "synthetic": SyntheticHuman(make_driver("zoo/strike")),
+        "random": make_driver("random"),
     }
     success = {
         name: evaluate(player, "strike", episodes=300, name=name).success

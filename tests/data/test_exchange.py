@@ -21,7 +21,7 @@ from marl_airhockey.data.exchange.trajectories import (
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import relabelled
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.recording import FILM
 
 pd = pytest.importorskip("pandas")
@@ -32,7 +32,7 @@ av = pytest.importorskip("av")
 
 def recorded(folder, scenario="reach", driver="reacher", episodes=3, **keywords):
     path = folder / "recording"
-    agent = make_agent(driver)
+    agent = make_driver(driver)
     return record_episodes(agent, driver, scenario, episodes, path, 0, keywords)
 
 

@@ -12,7 +12,7 @@ from marl_airhockey.data.exchange.minari import export_minari, import_minari
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 minari = pytest.importorskip("minari")
 NAME = "airhockey/reach/test-v0"
@@ -25,7 +25,7 @@ def root(tmp_path, monkeypatch):
 
 
 def recorded(folder, scenario="reach", driver="reacher", episodes=3, **keywords):
-    agent = make_agent(driver)
+    agent = make_driver(driver)
     path = folder / "recording"
     return record_episodes(agent, driver, scenario, episodes, path, 0, keywords)
 

@@ -6,13 +6,13 @@ import pytest
 from marl_airhockey.data.hindsight import ACHIEVED, DESIRED, with_hindsight
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.rollout.columns import scenario_of
 
 
 def recorded(folder, scenario, driver, episodes=8, **keywords):
     path = folder / f"{scenario}-{driver.replace('/', '-')}"
-    agent = make_agent(driver)
+    agent = make_driver(driver)
     return record_episodes(agent, driver, scenario, episodes, path, 0, keywords)
 
 

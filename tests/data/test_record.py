@@ -17,7 +17,7 @@ from marl_airhockey.rollout.columns import memories_of, scenario_of, states_of
 
 
 def record(tmp_path, agent, scenario, episodes=3, **keywords):
-    driver = ah.make_agent(agent)
+    driver = ah.make_driver(agent)
     path = tmp_path / "recording"
     return record_episodes(driver, agent, scenario, episodes, path, 7, keywords)
 
@@ -27,7 +27,7 @@ def test_an_episode_is_what_a_world_with_its_seed_does(tmp_path, profile):
     keywords = {"profile": profile, "observe": "history"}
     recording = read_recording(record(tmp_path, "striker", "juggle", **keywords))
     scenario = scenario_of(recording)
-    world = build_driven_world(ah.make_agent("striker"), "juggle", 1, keywords)
+    world = build_driven_world(ah.make_driver("striker"), "juggle", 1, keywords)
     for k, episode in enumerate(recording.episodes):
         assert episode.seed == 7 + k
         world.reset(7 + k)
@@ -100,7 +100,7 @@ def test_what_does_not_fit_the_scenario_is_named(tmp_path):
 
 
 def test_an_interrupted_recording_is_gone_on_with(tmp_path, monkeypatch):
-    driver, reach = ah.make_agent("still"), ah.make_scenario("reach")
+    driver, reach = ah.make_driver("still"), ah.make_scenario("reach")
     calls, steps = [], round(reach.seconds / 0.05)
     act = driver.act
 
@@ -149,7 +149,7 @@ def test_a_folder_of_something_else_is_refused(tmp_path):
         record(tmp_path, "still", "reach", 1)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine")
-    driver = ah.make_agent("still")
+    driver = ah.make_driver("still")
     with pytest.raises(ValueError, match="holds something else"):
         record_episodes(driver, "still", "touch", 1, tmp_path / "other", 7, {})
 

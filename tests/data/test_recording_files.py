@@ -24,7 +24,7 @@ from marl_airhockey.data.reader import (
 )
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.writer import PART, RecordingWriter
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.recording import FORMAT
 
 pa = pytest.importorskip("pyarrow")
@@ -448,7 +448,7 @@ def test_a_missing_recording_is_named(tmp_path):
 
 def test_steps_that_lack_at_the_end_are_named(tmp_path):
     path = record_episodes(
-        make_agent("still"), "still", "reach", 3, tmp_path / "a", 0, {}
+        make_driver("still"), "still", "reach", 3, tmp_path / "a", 0, {}
     )
     (part,) = path.glob("steps/*.parquet")
     table = pq.read_table(part)

@@ -25,7 +25,7 @@ PAGES = [
     *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")),
     *sorted((ROOT / "docs").glob("*.md")),
 ]
-CODE = ("marl_airhockey", "scenarios", "agents", "scripts", "tests")
+CODE = ("marl_airhockey", "scenarios", "drivers", "scripts", "tests")
 SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 COMMAND = re.compile(
     r"^\s*(?:\$ )?((?:airhockey|python scripts/\S+|make(?= [a-z])) .*?)(?:  +#.*|&)?$"

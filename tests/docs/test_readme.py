@@ -25,7 +25,7 @@ def test_a_python_block_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if name.startswith("data-"):
         # The page's first command makes a recording.
-        player, path = ah.make_agent("striker"), Path("recordings/juggle")
+        player, path = ah.make_driver("striker"), Path("recordings/juggle")
         record_episodes(player, "striker", "juggle", 2, path, 0, {})
     exec(BLOCKS[name], {})
 

@@ -7,7 +7,7 @@ from tutorials import run
 
 from marl_airhockey.data.exchange.formats import find_format
 from marl_airhockey.data.record import record_episodes
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 
 @pytest.mark.slow
@@ -48,7 +48,7 @@ def test_recurrent_and_hindsight_policies_of_sb3_contrib_learn():
 
 
 def recorded(path, task):
-    agent = make_agent(f"zoo/{task}")
+    agent = make_driver(f"zoo/{task}")
     return record_episodes(agent, task, task, 60, path / task, 0, {})
 
 

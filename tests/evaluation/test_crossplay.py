@@ -1,4 +1,4 @@
-"""Play with mates that a player was not trained with."""
+"""Play with teammates that a player was not trained with."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 import marl_airhockey as ah
 from marl_airhockey.evaluation.crossplay import CrossPlay
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 SHORT = {"options": {"seconds": 8.0}}
 
@@ -26,16 +26,16 @@ def test_the_gap_is_what_players_lose_with_others():
 def test_every_player_meets_every_other_in_both_roles():
     found = ah.crossplay("rally", ["allround", "still"], episodes=8, seed=3, **SHORT)
     assert found.returns[0, 0] > found.returns[1, 1] == 0.0
-    one, mate = make_agent("still"), {"drivers": {"paddle_1": "allround"}}
-    alone = evaluate(one, "rally", episodes=8, seed=3, **{**SHORT, **mate})
+    one, teammate = make_driver("still"), {"drivers": {"paddle_1": "allround"}}
+    alone = evaluate(one, "rally", episodes=8, seed=3, **{**SHORT, **teammate})
     assert found.returns[1, 0] == alone.returns
     assert found.to_json()["players"] == ["allround", "still"]
 
 
 def test_in_doubles_mates_are_drawn_and_opponents_given():
-    rivals = {"drivers": {"paddle_2": "still", "paddle_3": "still"}}
+    opponents = {"drivers": {"paddle_2": "still", "paddle_3": "still"}}
     names, given = ["allround", "still"], {"episodes": 4, "seed": 3, **SHORT}
-    found = ah.crossplay("doubles", names, **given, **rivals)
+    found = ah.crossplay("doubles", names, **given, **opponents)
     assert found.returns[0, 0] > 0.0
     with pytest.raises(ValueError, match="paddle_2"):
         ah.crossplay("doubles", names, **given)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from marl_airhockey.evaluation.games import play_games
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 
 def test_games_have_a_winner_or_none_and_ends_do_not_matter():
-    players = [make_agent("allround"), make_agent("random")]
+    players = [make_driver("allround"), make_driver("random")]
     lineups = np.array([[0, 1]] * 20 + [[1, 0]] * 20)
     found = play_games("duel", players, lineups, 0, {"backend": "numba"})
     np.testing.assert_allclose(found.score.sum(-1), 1.0)

@@ -8,14 +8,14 @@ import pytest
 from marl_airhockey.evaluation.games import GameResults
 from marl_airhockey.evaluation.league import compared, league, lineups_of
 from marl_airhockey.evaluation.stats import elo, nash_mixture
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 SHORT = {"options": {"seconds": 6.0}, "backend": "numba"}
 
 
 def test_a_league_rates_and_names_its_files(tmp_path):
     names = ("random", "allround", "striker:strength=weak", "still")
-    players = {name: make_agent(name) for name in names}
+    players = {name: make_driver(name) for name in names}
     standings = league("duel", players, games=20, **SHORT)
     off = ~np.eye(4, dtype=bool)
     np.testing.assert_allclose((standings.score + standings.score.T)[off], 1.0)
@@ -79,7 +79,7 @@ def test_lineups_let_all_pairs_meet_alike(players, sides):
 
 def test_a_league_of_four_sides_rates_by_places(tmp_path):
     names = ("still", "random", "goalkeeper", "allround", "striker")
-    players = {name: make_agent(name) for name in names}
+    players = {name: make_driver(name) for name in names}
     short = {"options": {"seconds": 15.0, "lives": 1}}
     standings = league("free_for_all", players, games=24, **short)
     assert standings.played.sum() > 0

@@ -12,7 +12,7 @@ from marl_airhockey.cli.main import app
 from marl_airhockey.evaluation.comparison import Outcomes, compare
 from marl_airhockey.evaluation.trial_sheet import TrialRow, TrialSheet, plan_trials
 from marl_airhockey.evaluation.trials import play_trials, spread, spread_starts
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 METHODS = {"new": ["sticky", "random"], "old": ["still"]}
 
@@ -22,11 +22,11 @@ def plan(trials=6, starts=(5, 7, 9)):
 
 
 def drivers():
-    return {name: [make_agent(p) for p in paths] for name, paths in METHODS.items()}
+    return {name: [make_driver(p) for p in paths] for name, paths in METHODS.items()}
 
 
 def one_world():
-    return build_driven_world(make_agent("still"), "juggle", 1, {})
+    return build_driven_world(make_driver("still"), "juggle", 1, {})
 
 
 def test_every_method_plays_from_every_start_equally_often():
@@ -93,7 +93,7 @@ def test_starts_are_spread_and_each_is_there_once():
     assert len(set(seeds)) == 16
 
     def places(seeds):
-        world = build_driven_world(make_agent("still"), "juggle", len(seeds), {})
+        world = build_driven_world(make_driver("still"), "juggle", len(seeds), {})
         world.reset(seeds)
         return world.state.puck[:, 0]
 

@@ -14,7 +14,7 @@ from marl_airhockey.data.record import record_episodes
 from marl_airhockey.learn.offline.config import offline_config
 from marl_airhockey.learn.offline.pixels import PixelActor, render_pictures
 from marl_airhockey.learn.train import run_training
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 SMALL = {
     **{"observe": "pixels", "total_steps": 200, "batch_size": 16, "hidden": [16]},
@@ -24,7 +24,10 @@ SMALL = {
 
 @pytest.fixture(scope="module")
 def expert(tmp_path_factory):
-    player, folder = make_agent("zoo/hit_goal"), tmp_path_factory.mktemp("pixels") / "a"
+    player, folder = (
+        make_driver("zoo/hit_goal"),
+        tmp_path_factory.mktemp("pixels") / "a",
+    )
     record_episodes(player, "zoo/hit_goal", "hit_goal", 3, folder, 3, {})
     return folder
 
@@ -85,7 +88,7 @@ def test_a_run_from_pixels_goes_on_and_leaves_an_onnx_policy(expert, tmp_path):
 def test_what_pixels_cannot_do_is_named(expert, tmp_path):
     with pytest.raises(ValueError, match="bc alone, not iql"):
         offline_config("iql", [expert], SMALL)
-    player = make_agent("zoo/touch")
+    player = make_driver("zoo/touch")
     keywords = {"profile": "ur5e"}
     path = record_episodes(player, "x", "touch", 1, tmp_path / "b", 3, keywords)
     with pytest.raises(ValueError, match="profile ideal"):

@@ -19,14 +19,14 @@ from marl_airhockey.learn.offline.choice import learned_from
 from marl_airhockey.learn.offline.config import ALGORITHMS, offline_config
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.train import load_any_config, run_training
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 SMALL = {"hidden": [64, 64], "total_steps": 1500, "evaluations": 3}
 
 
 def record(folder, agent, scenario, episodes, **keywords):
     return record_episodes(
-        make_agent(agent), agent, scenario, episodes, folder, 3, keywords
+        make_driver(agent), agent, scenario, episodes, folder, 3, keywords
     )
 
 
@@ -111,7 +111,7 @@ def test_what_an_expert_did_is_learned(algo, expert, tmp_path):
     assert row["success"] >= 0.9
     assert row["steps"] == steps
     assert load_any_config(tmp_path / "run") == config
-    driver = ah.make_agent(tmp_path / "run")
+    driver = ah.make_driver(tmp_path / "run")
     assert evaluate(driver, "reach", episodes=50).success >= 0.9
 
 
@@ -236,7 +236,7 @@ def test_recordings_with_goals_apart_are_learned_from(tmp_path, given):
     apart = tmp_path / "goals"
     record(apart, "still", "hit_goal", 2, **given)
     run_training(offline_config("bc", [apart], SMALL), tmp_path / "run")
-    policy = make_agent(tmp_path / "run")
+    policy = make_driver(tmp_path / "run")
     assert evaluate(policy, "hit_goal", episodes=2, goals="dict").episodes == 2
 
 

@@ -19,7 +19,7 @@ from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.offline.iql import ImplicitQLearning
 from marl_airhockey.learn.offline.rebrac import ReBRAC
 from marl_airhockey.learn.offline.td3_bc import TD3BC
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 SMALL = {"hidden": [64, 64], "alpha": 2.5}
 SIZE = 8
@@ -30,7 +30,7 @@ VALUE = {"in_keys": ["observation", "action"], "out_keys": ["state_action_value"
 @pytest.fixture(scope="module")
 def expert(tmp_path_factory):
     path = tmp_path_factory.mktemp("expert") / "recording"
-    agent = make_agent("zoo/reach")
+    agent = make_driver("zoo/reach")
     return record_episodes(agent, "zoo/reach", "reach", 40, path, 3, {})
 
 

@@ -134,7 +134,7 @@ def test_a_run_that_fails_to_start_leaves_no_folder(tmp_path):
         ah.train("duel", folder, drivers={"paddle_1": "nobody"}, total_steps=1000)
     assert not folder.exists()
     with pytest.raises(ValueError, match="unknown driver"):
-        ah.train("duel", folder, rivals=["nobody"], total_steps=1000)
+        ah.train("duel", folder, eval_opponents=["nobody"], total_steps=1000)
     assert not folder.exists()
 
 
@@ -171,7 +171,12 @@ def test_all_cpu_time_is_counted_by_kind(tmp_path):
 
 def test_evaluations_of_a_game_are_a_share_of_its_training():
     def steps(config):
-        return config.evaluations * config.eval_episodes * len(config.rivals) * 1200
+        return (
+            config.evaluations
+            * config.eval_episodes
+            * len(config.eval_opponents)
+            * 1200
+        )
 
     short, whole = preset("duel", {"total_steps": 600_000}), preset("duel")
     assert short.evaluations == 1

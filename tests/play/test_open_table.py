@@ -39,7 +39,7 @@ def table():
     return open_table(LiveMatch("duel", {}, {"options": {"seconds": 30.0}}, seed=1))
 
 
-def test_whoever_remains_goes_on_against_a_program_or_ends_the_match(table):
+def test_whoever_remains_goes_on_against_a_driver_or_ends_the_match(table):
     one, other = enter(table, "1"), enter(table, "2")
     begin(table, one)
     table.disconnect(other)
@@ -147,7 +147,7 @@ def test_lives_or_shots_decide_a_game_of_all():
     assert judge(memory) == "lives"
 
 
-def test_rivals_are_programs_of_another_team():
-    assert LiveMatch("duel", {"paddle_1": "still"}, {}).has_rivals
-    assert not LiveMatch("duel", {}, {}).has_rivals
-    assert not LiveMatch("juggle", {}, {}).has_rivals
+def test_opponents_are_drivers_of_another_team():
+    assert LiveMatch("duel", {"paddle_1": "still"}, {}).has_opponents
+    assert not LiveMatch("duel", {}, {}).has_opponents
+    assert not LiveMatch("juggle", {}, {}).has_opponents

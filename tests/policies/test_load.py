@@ -13,7 +13,7 @@ from marl_airhockey.learn.sb3 import build_model
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.runs import RUN_FORMAT
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 
 def test_a_policy_plays_the_same_deterministically_and_samples_otherwise(touch_run):
@@ -120,7 +120,7 @@ def test_an_exported_policy_is_one_small_file(tmp_path):
         tmp_path / "policy.npz"
     )
     assert (tmp_path / "policy.npz").stat().st_size < 300_000
-    driver = make_agent(tmp_path / "policy.npz")
+    driver = make_driver(tmp_path / "policy.npz")
     seen = env.reset()
     mean = model.predict(seen, deterministic=True)[0]
     np.testing.assert_allclose(

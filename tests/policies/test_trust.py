@@ -15,7 +15,7 @@ from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 from marl_airhockey.policies.trust import Trust
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 
 
 class Trap:
@@ -44,7 +44,7 @@ def test_a_zip_with_code_is_refused_before_it_runs(trap, monkeypatch):
     path, sprung = trap
     for load in (
         load_policy,
-        make_agent,
+        make_driver,
         lambda p: ah.make_world("reach", 1, drivers={"paddle_0": str(p)}),
     ):
         with pytest.raises(ValueError, match=r"pickled Python.*--trust"):
@@ -166,9 +166,9 @@ def test_names_cannot_say_that_they_are_trusted(trap):
     path, sprung = trap
     for name in (f"{path}:trust=yes", f"zoo/juggle:path={path}", str(path)):
         with pytest.raises(ValueError, match=r"unknown|no such run|pickled Python"):
-            make_agent(name)
+            make_driver(name)
     with pytest.raises(ValueError, match=r"unknown option .*'trust'"):
-        make_agent(path, trust=True)
+        make_driver(path, trust=True)
     assert not sprung.exists()
 
 
@@ -179,7 +179,7 @@ def test_a_file_is_a_file_whatever_its_name_looks_like(trap, tmp_path):
     (folder / "evil.py").write_text(f"open({str(sprung)!r}, 'w')")
     for name in ("evil.py:x.npz", f"still:path={path.name},trust=1,a=.npz"):
         written(folder / name)
-    players = [make_agent(found) for found in find_policies(folder)]
+    players = [make_driver(found) for found in find_policies(folder)]
     assert [player.shape for player in players] == [(8,), (8,)]
     assert not sprung.exists()
 

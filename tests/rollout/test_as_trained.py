@@ -8,7 +8,7 @@ from command import airhockey
 from runs import SMALL
 
 import marl_airhockey as ah
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.rollout.as_trained import as_trained, describe_environment
 
 GENTLE = """
@@ -33,7 +33,7 @@ def gentle_run(tmp_path_factory):
 
 
 def test_zoo_policy_plays_in_the_profile_of_its_training():
-    players = {"juggle_ur5e": make_agent("zoo/juggle_ur5e")}
+    players = {"juggle_ur5e": make_driver("zoo/juggle_ur5e")}
     scenario, keywords = as_trained(players, None, {})
     assert (scenario, keywords["profile"]) == ("juggle", "ur5e")
     assert as_trained(players, None, {"profile": "ideal"})[1]["profile"] == "ideal"
@@ -77,7 +77,7 @@ def test_code_that_was_not_trained_with_is_refused(gentle_run, tmp_path):
 
 
 def test_policies_of_different_profiles_need_a_word():
-    players = {name: make_agent(name) for name in ("zoo/duel", "zoo/duel_robot")}
+    players = {name: make_driver(name) for name in ("zoo/duel", "zoo/duel_robot")}
     with pytest.raises(ValueError, match=r"profile: .*zoo/duel: ideal, .*ur5e"):
         as_trained(players, "duel", {})
     options = {"options": {"seats": "robot"}, "profile": "ur5e"}
@@ -95,7 +95,7 @@ def test_a_model_on_goals_gets_the_goals_apart():
             return np.zeros((len(observation["observation"]), 2)), None
 
     assert ah.evaluate(Model(), "reach", episodes=2).episodes == 2
-    line = describe_environment("reach", {"goals": "dict"}, {"x": make_agent("still")})
+    line = describe_environment("reach", {"goals": "dict"}, {"x": make_driver("still")})
     assert line == "reach: profile ideal, control_dt 0.05 s"
 
 

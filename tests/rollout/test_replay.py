@@ -23,7 +23,7 @@ def recorded(path, scenario, episodes=3, **keywords):
     seats = len(ah.make_scenario(scenario).scene.seats)
     drivers = {f"paddle_{i}": "striker" for i in range(1, seats)}
     keywords = {"max_cycles": 160, "drivers": drivers, **keywords}
-    record_episodes(ah.make_agent(name), name, scenario, episodes, path, 7, keywords)
+    record_episodes(ah.make_driver(name), name, scenario, episodes, path, 7, keywords)
     return read_recording(path)
 
 

@@ -22,7 +22,7 @@ OTHER, SHORT = {"paddle_1": "striker"}, {"max_cycles": 20}
 @pytest.mark.parametrize("profile", PROFILES)
 def test_episodes_are_those_of_a_recording(profile, tmp_path):
     keywords = {"profile": profile}
-    striker = ah.make_agent("striker")
+    striker = ah.make_driver("striker")
     record_episodes(striker, "striker", "touch", 3, tmp_path / "r", 7, keywords)
     recorded = read_recording(tmp_path / "r").episodes
     played = list(ah.rollout("striker", "touch", episodes=3, seed=7, **keywords))
@@ -77,7 +77,7 @@ def test_a_rollout_that_is_not_read_to_its_end_is_closed():
 
 @pytest.mark.parametrize(("task", "profile"), [("strike", "ideal"), ("juggle", "ur5e")])
 def test_a_recording_is_measured_as_its_play_was(task, profile, tmp_path):
-    striker, keywords = ah.make_agent("striker"), {"profile": profile}
+    striker, keywords = ah.make_driver("striker"), {"profile": profile}
     record_episodes(striker, "striker", task, 20, tmp_path / "r", 3, keywords)
     found = evaluate_recording(tmp_path / "r")
     played = ah.evaluate(striker, task, episodes=20, seed=3, name="striker", **keywords)
@@ -93,7 +93,7 @@ def test_a_recording_is_measured_as_its_play_was(task, profile, tmp_path):
 
 def test_recordings_are_compared_without_new_trials(tmp_path):
     for name in ("striker", "still"):
-        driver = ah.make_agent(name)
+        driver = ah.make_driver(name)
         record_episodes(driver, name, "strike", 10, tmp_path / name, 3, {})
     told = airhockey("trials", tmp_path / "striker", tmp_path / "still", "--json")
     first, second = json.loads(told.stdout)["methods"]

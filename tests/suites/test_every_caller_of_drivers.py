@@ -7,7 +7,7 @@ import marl_airhockey as ah
 from marl_airhockey.evaluation import evaluate as evaluation
 from marl_airhockey.play import match_drivers
 from marl_airhockey.play.live_match import RATE, LiveMatch
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.profiles import PROFILES
 from marl_airhockey.sim.world.roster import Roster
 
@@ -15,7 +15,7 @@ STEPS = 60
 SCENARIOS = "juggle", "team_juggle", "duel"
 
 
-class Comparing(type(make_agent("striker"))):
+class Comparing(type(make_driver("striker"))):
     """Driver that compares what it is shown with what its world would observe."""
 
     world = None
@@ -82,14 +82,14 @@ def test_a_driver_observes_what_an_agent_would(caller, name, profile, monkeypatc
     driver = Comparing()
 
     def made(player):
-        return driver if player == "striker" else make_agent(player)
+        return driver if player == "striker" else make_driver(player)
 
     def build(*args):
         driver.world = build_driven_world(*args)
         return driver.world
 
     build_driven_world = evaluation.build_driven_world
-    monkeypatch.setattr(match_drivers, "make_agent", made)
+    monkeypatch.setattr(match_drivers, "make_driver", made)
     monkeypatch.setattr(evaluation, "build_driven_world", build)
     caller(driver, name, {"profile": profile})
     assert driver.compared > 20

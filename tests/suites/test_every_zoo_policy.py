@@ -11,7 +11,7 @@ from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.policies.load import ZOO
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
-from marl_airhockey.registry import make_agent, zoo_names
+from marl_airhockey.registry import make_driver, zoo_names
 
 # The lower levels of a game's ladder differ from its strongest by numbers alone.
 # Policies of other profiles and tables are measured in the same way.
@@ -41,7 +41,7 @@ def test_it_is_as_good_as_its_card(name):
     options = {"backend": "numba", "profile": card["profile"]}
     options["options"] = card["options"]
     if "success" in grades:
-        driver = ah.make_agent(name)
+        driver = ah.make_driver(name)
         found = evaluate(
             driver,
             card["scenario"],
@@ -54,10 +54,10 @@ def test_it_is_as_good_as_its_card(name):
         _, high = found.success_interval
         assert high >= grades["low"]
         return
-    for rival, (_, low, _) in grades["score"].items():
-        rivals = [make_agent(rival)]
-        driver = ah.make_agent(name)
-        score, _ = play_against(card["scenario"], driver, rivals, 40, 7, options)
+    for opponent, (_, low, _) in grades["score"].items():
+        opponents = [make_driver(opponent)]
+        driver = ah.make_driver(name)
+        score, _ = play_against(card["scenario"], driver, opponents, 40, 7, options)
         assert score[0] >= low - 0.2
 
 
@@ -87,11 +87,11 @@ def test_it_plays_without_a_deep_learning_library():
 
 
 def test_soft_shots_do_not_beat_the_one_of_doubles():
-    driver, rivals = make_agent("zoo/doubles"), [make_agent("allround:shot=0.3")]
-    score, _ = play_against("doubles", driver, rivals, 40, 7, {})
+    driver, opponents = make_driver("zoo/doubles"), [make_driver("allround:shot=0.3")]
+    score, _ = play_against("doubles", driver, opponents, 40, 7, {})
     assert score[0] >= 0.8
 
 
 def test_an_unknown_policy_is_named():
     with pytest.raises(ValueError, match=r"unknown policy of the zoo 'zoo/dule'"):
-        ah.make_agent("zoo/dule")
+        ah.make_driver("zoo/dule")

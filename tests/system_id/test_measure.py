@@ -8,7 +8,7 @@ from marl_airhockey.cli.main import app
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.trust import Trust
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.system_id.measure import (
     fine_tuning_config,
     measure_transfer,
@@ -28,7 +28,7 @@ SMALL = {
 def test_success_is_measured_in_all_physics(tmp_path):
     pytest.importorskip("robosuite")
     backends = ["numba", "pymunk", "robosuite"]
-    policies = {"zoo": make_agent("zoo/reach"), "nothing": make_agent("still")}
+    policies = {"zoo": make_driver("zoo/reach"), "nothing": make_driver("still")}
     rows = measure_transfer(policies, "reach", backends, ["ideal"], episodes=20)
     assert [row.backend for row in rows] == backends * 2
     assert min(row.success for row in rows[:3]) > 0.8

@@ -7,7 +7,7 @@ from marl_airhockey.data.files import recordings_in
 from marl_airhockey.play.live_match import RATE, LiveMatch
 from marl_airhockey.play.open_table import open_table
 from marl_airhockey.play.recorder import Recorder
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.physics import load_physics
 from marl_airhockey.system_id.recorded_play import load_recordings, record_play
 from marl_airhockey.system_id.system_id import FITTED, fit_physics
@@ -23,7 +23,7 @@ OTHER = {
 
 def test_the_physics_of_another_table_are_found(tmp_path):
     table = {"backend": "pymunk", "physics": OTHER}
-    seen = record_play("juggle", make_agent("zoo/juggle"), 1500, 0, table)
+    seen = record_play("juggle", make_driver("zoo/juggle"), 1500, 0, table)
     found = fit_physics(seen)
     for name in FITTED:
         assert found.physics[name] == pytest.approx(OTHER[name], rel=0.12), name
@@ -40,7 +40,7 @@ def test_the_physics_of_another_table_are_found(tmp_path):
 def test_an_arm_is_nearer_to_the_fitted_table():
     pytest.importorskip("robosuite")
     there = {"backend": "robosuite", "physics": OTHER}
-    seen = record_play("juggle", make_agent("zoo/juggle"), 1000, 0, there)
+    seen = record_play("juggle", make_driver("zoo/juggle"), 1000, 0, there)
     found = fit_physics(seen)
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.2)
     assert found.error_reduction > 0.5
@@ -64,15 +64,15 @@ def test_recordings_are_fitted_to(tmp_path):
     found = fit_physics(seen)
     assert found.physics["tilt"] == pytest.approx(4.8, abs=0.1)
     with pytest.raises(ValueError, match="too few"):
-        fit_physics(record_play("juggle", make_agent("striker"), 100, 0, {}))
+        fit_physics(record_play("juggle", make_driver("striker"), 100, 0, {}))
     with pytest.raises(ValueError, match="blocks"):
-        fit_physics(record_play("move_block", make_agent("striker"), 10, 0, {}))
+        fit_physics(record_play("move_block", make_driver("striker"), 10, 0, {}))
 
 
 def test_a_puck_that_is_served_is_not_fitted_to():
     drivers = {"paddle_1": "still"}
     options = {"drivers": drivers, "options": {"seats": "arcade"}}
-    seen = record_play("duel", make_agent("striker"), 1500, 0, options)
+    seen = record_play("duel", make_driver("striker"), 1500, 0, options)
     way = np.hypot(*np.diff(seen.position[:, 2], axis=0).T)
     served = np.flatnonzero(way > 0.4) + 1
     assert len(served) > 2

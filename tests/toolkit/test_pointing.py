@@ -29,10 +29,10 @@ def places(driver, physics, steps=80):
     ("lag", "physics"), [(0.0, {}), (0.1, {}), (0.1, SERVO)], ids=str
 )
 def test_it_comes_to_rest_there(lag, physics):
-    off = np.linalg.norm(places(ah.make_agent(f"mouse:lag={lag}"), physics), axis=1)
+    off = np.linalg.norm(places(ah.make_driver(f"mouse:lag={lag}"), physics), axis=1)
     assert off[40:].max() < 0.004
 
 
 def test_without_prediction_a_late_paddle_swings():
-    off = np.linalg.norm(places(ah.make_agent("mouse"), SERVO), axis=1)
+    off = np.linalg.norm(places(ah.make_driver("mouse"), SERVO), axis=1)
     assert off[40:].max() > 0.004

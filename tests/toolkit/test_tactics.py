@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from marl_airhockey.evaluation.games import play_against
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 
 REACTION, NOISE = 0.2, 0.012
@@ -16,7 +16,7 @@ class Person(Driver):
     """Player with the tactics of the best script and the eyes of a person."""
 
     def __init__(self):
-        self.tactics = make_agent("allround")
+        self.tactics = make_driver("allround")
 
     def act(self, view, memory):
         pucks = view.state.bodies.pucks
@@ -33,7 +33,7 @@ OTHERS = [
 
 @pytest.mark.parametrize("script", ["goalkeeper", *OTHERS])
 def test_a_weak_script_loses_to_a_person(script):
-    weak = [make_agent(f"{script}:strength=weak")]
+    weak = [make_driver(f"{script}:strength=weak")]
     late = {"options": {"reaction": REACTION}}
     score, goals = play_against("duel", Person(), weak, 20, 0, late)
     assert score[0] >= 0.5

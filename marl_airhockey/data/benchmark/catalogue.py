@@ -15,7 +15,7 @@ from pathlib import Path
 from marl_airhockey.data.benchmark.synthetic import SyntheticHuman
 from marl_airhockey.data.files import PREFIX
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 
 VERSION = 0
@@ -76,11 +76,11 @@ def snapshot(task: str, level: str) -> Path:
 
 
 def _random(share: float) -> Part:
-    return Part("random", lambda: make_agent("random"), share)
+    return Part("random", lambda: make_driver("random"), share)
 
 
 def _expert(task: str, share: float) -> Part:
-    return Part("expert", lambda: make_agent(f"zoo/{task}"), share)
+    return Part("expert", lambda: make_driver(f"zoo/{task}"), share)
 
 
 def _unfinished(task: str, level: str, share: float) -> Part:
@@ -90,7 +90,7 @@ def _unfinished(task: str, level: str, share: float) -> Part:
 
 
 def _synthetic(policy: str, share: float) -> Part:
-    return Part("synthetic-human", lambda: SyntheticHuman(make_agent(policy)), share)
+    return Part("synthetic-human", lambda: SyntheticHuman(make_driver(policy)), share)
 
 
 TIERS: dict[str, tuple[str, Callable[[str], tuple[Part, ...]]]] = {
@@ -128,11 +128,17 @@ TIERS: dict[str, tuple[str, Callable[[str], tuple[Part, ...]]]] = {
 def _play() -> tuple[Part, ...]:
     """Return the parts of play in the duel: different pairs of players."""
     players = {
-        "zoo-duel": (lambda: make_agent("zoo/duel", deterministic=False), "zoo/duel_1"),
-        "synthetic-human": (lambda: SyntheticHuman(make_agent("zoo/duel")), "allround"),
-        "allround": (lambda: make_agent("allround"), "zoo/duel_2"),
-        "striker": (lambda: make_agent("striker"), "goalkeeper"),
-        "random": (lambda: make_agent("random"), "striker"),
+        "zoo-duel": (
+            lambda: make_driver("zoo/duel", deterministic=False),
+            "zoo/duel_1",
+        ),
+        "synthetic-human": (
+            lambda: SyntheticHuman(make_driver("zoo/duel")),
+            "allround",
+        ),
+        "allround": (lambda: make_driver("allround"), "zoo/duel_2"),
+        "striker": (lambda: make_driver("striker"), "goalkeeper"),
+        "random": (lambda: make_driver("random"), "striker"),
     }
     return tuple(
         Part(name, make, 1 / len(players), {"paddle_1": other})

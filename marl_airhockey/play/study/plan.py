@@ -58,7 +58,7 @@ QUESTIONS = {
         Question(
             "origin",
             "Whom did you play against?",
-            choices=("a person", "a program"),
+            choices=("a person", "a computer"),
         ),
         Question(
             "certainty", "How sure are you of that?", "I am guessing", "I am certain"

@@ -114,17 +114,17 @@ function scoreboard() {
 function titleOf(i) {
   const { driver, title } = now.seats[i];
   if (title !== undefined) return i === now.seat ? "You" : title;
-  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : programTitle(driver);
+  return driver === "person" ? (i === now.seat ? "You" : now.seats[i].taken ? "A person" : "Free seat") : driverTitle(driver);
 }
 
 // Names that players read; the details have those of the command line.
-function programTitle(name) {
+function driverTitle(name) {
   if (name.startsWith("zoo/")) {
     const kind = name.slice(4).replace(match.scenario, "").replaceAll("_", " ").trim();
     return `Computer, trained${kind ? ` (${kind})` : ""}`;
   }
-  const [program, strength] = name.split(":strength=");
-  return program.startsWith("shadow:") ? "A hand" : `Computer, ${program.replaceAll("_", " ")}${strength ? `, ${strength}` : ""}`;
+  const [driver, strength] = name.split(":strength=");
+  return driver.startsWith("shadow:") ? "A hand" : `Computer, ${driver.replaceAll("_", " ")}${strength ? `, ${strength}` : ""}`;
 }
 
 let panel = "";
@@ -143,7 +143,7 @@ function seats(free) {
       const list = document.createElement("select");
       list.setAttribute("aria-label", `who plays seat ${i + 1}`);
       for (const name of [...new Set(["person", seat.driver, ...match.choices])]) {
-        const option = new Option(name === "person" ? "Another person" : programTitle(name), name);
+        const option = new Option(name === "person" ? "Another person" : driverTitle(name), name);
         option.selected = name === seat.driver; list.append(option);
       }
       list.onchange = () => { send("opponent", { seat: i, name: list.value }); list.blur(); panel = ""; };

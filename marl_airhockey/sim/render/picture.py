@@ -198,13 +198,13 @@ def _bar(canvas: Canvas, frame: Frame) -> None:
 
 
 def _seat_colour(scene: Scene, seat: int) -> Colour:
-    """Return a colour of the seat's own, or the team's, paler for later mates."""
+    """Return a colour of the seat's own, or the team's, paler for later teammates."""
     teams = [s.team for s in scene.seats]
     if len(set(teams)) in (1, len(teams)):
         return SEAT_COLOURS[seat % len(SEAT_COLOURS)]
-    mates = [i for i, team in enumerate(teams) if team == teams[seat]]
+    teammates = [i for i, team in enumerate(teams) if team == teams[seat]]
     colour = SEAT_COLOURS[teams[seat] % len(SEAT_COLOURS)]
-    return _pale(colour, 0.4 * mates.index(seat) / (len(mates) - 1))
+    return _pale(colour, 0.4 * teammates.index(seat) / (len(teammates) - 1))
 
 
 def _pale(colour: Colour, share: float) -> Colour:

@@ -14,7 +14,7 @@ import marl_airhockey as ah
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.hardware.table.backend import RealBackend
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.recording import PLAYED
 
 EPISODES = 3
@@ -47,7 +47,7 @@ def test_a_recording_makes_no_command_late(rig, taken, tmp_path):
             begun[0] = len(taken)
 
     record_episodes(
-        *(make_agent("zoo/reach_full_size"), "reach", "reach", EPISODES),
+        *(make_driver("zoo/reach_full_size"), "reach", "reach", EPISODES),
         *(tmp_path / "new", 1, keywords, True),
         ended,
     )

@@ -16,7 +16,7 @@ from marl_airhockey.cli.main import app
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.hardware.lab.lab import LabClient
 from marl_airhockey.hardware.rig import Rig
-from marl_airhockey.registry import find_backend, make_agent
+from marl_airhockey.registry import find_backend, make_driver
 from marl_airhockey.sim.core.errors import UnknownKeywordError
 from marl_airhockey.sim.core.table import TABLES
 
@@ -31,7 +31,7 @@ def keywords(rig, **options):
 
 
 def test_a_policy_reaches_through_camera_and_robot(rig):
-    driver = make_agent("zoo/reach_full_size")
+    driver = make_driver("zoo/reach_full_size")
     result = evaluate(driver, "reach", episodes=2, **keywords(rig))
     assert result.success == 1.0
     assert result.interrupted == 0
@@ -40,7 +40,7 @@ def test_a_policy_reaches_through_camera_and_robot(rig):
 @pytest.mark.slow
 def test_a_puck_is_seen_touched_and_lost_as_it_is(lab, rig):
     world = build_driven_world(
-        make_agent("zoo/touch_full_size"), "touch", 1, keywords(rig)
+        make_driver("zoo/touch_full_size"), "touch", 1, keywords(rig)
     )
     try:
         world.reset(3)
@@ -161,7 +161,7 @@ def test_another_table_no_rig_and_a_wild_driver_are_refused(rig):
     with pytest.raises(ValueError, match="no devices"):
         ah.parallel_env("reach", rig=str(rig))
     with pytest.raises(ValueError, match="real arm"):
-        build_driven_world(make_agent("sticky"), "reach", 1, keywords(rig))
+        build_driven_world(make_driver("sticky"), "reach", 1, keywords(rig))
     with pytest.raises(UnknownKeywordError):
         ah.parallel_env("reach", rigg="x")
 

@@ -100,7 +100,7 @@ def test_a_hand_that_leaves_lets_the_paddle_rest(lab, hand):
 @pytest.mark.slow
 def test_copies_have_cameras_of_their_own(lab, hand):
     lab.ask(STILL)
-    driver = ah.make_agent(f"shadow:rig={hand},prescribe=true")
+    driver = ah.make_driver(f"shadow:rig={hand},prescribe=true")
     with driver:
         time.sleep(0.3)
         twin = copy.deepcopy(driver)
@@ -118,14 +118,14 @@ def test_copies_have_cameras_of_their_own(lab, hand):
 @pytest.mark.slow
 def test_another_rig_and_a_moved_camera_are_named(lab, hand, rig, tmp_path):
     with pytest.raises(ValueError, match="the rig of a table, expected that of a hand"):
-        ah.make_agent(f"shadow:rig={rig}")
+        ah.make_driver(f"shadow:rig={rig}")
     with pytest.raises(ValueError, match="the rig of a hand, expected that of a table"):
         Rig.load(hand)
     with pytest.raises(ValueError, match="calibrate --hand"):
-        ah.make_agent(f"shadow:rig={tmp_path / 'none.json'}")
+        ah.make_driver(f"shadow:rig={tmp_path / 'none.json'}")
     other = HandRig.load(hand)
     tags = {k: np.add(four, 0.03).tolist() for k, four in other.tags.items()}
     other = HandRig(**{**vars(other), "tags": tags})
     other.save(tmp_path / "moved.json")
     with pytest.raises(RuntimeError, match="mm from where they were"):
-        ah.make_agent(f"shadow:rig={tmp_path / 'moved.json'}").__enter__()
+        ah.make_driver(f"shadow:rig={tmp_path / 'moved.json'}").__enter__()

@@ -6,7 +6,7 @@ from emulators import ADDRESS, emulator, status, switch
 
 import marl_airhockey as ah
 from marl_airhockey.hardware.robot.nominal import nominal_mounting
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.table import TABLES
 
 TWIN = f"ur5e:host={ADDRESS},policy=zoo/reach_ur5e"
@@ -47,7 +47,7 @@ def step_often(world):
 )
 def test_bad_input_is_named(player, reason):
     with pytest.raises(ValueError, match=reason):
-        make_agent(player)
+        make_driver(player)
 
 
 def test_a_seat_that_is_no_robots_is_refused():
@@ -58,4 +58,4 @@ def test_a_seat_that_is_no_robots_is_refused():
 
 
 def test_its_environment_is_that_of_the_policy():
-    assert make_agent(TWIN).trained_in["profile"] == "ur5e"
+    assert make_driver(TWIN).trained_in["profile"] == "ur5e"

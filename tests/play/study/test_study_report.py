@@ -32,7 +32,7 @@ FREE = PLAN.replace(
 NAMED = FREE.replace(
     '{name = "striker", reaction = 0.1}',
     '{name = "striker", label = "=slow | steady", reaction = 0.1}',
-).replace("version", 'debriefing = "All were programs."\nversion')
+).replace("version", 'debriefing = "All were computers."\nversion')
 DEVICE = {"input": "touch", "width": 390, "height": 760, "density": 3.0, "hz": 60.0}
 
 
@@ -70,7 +70,7 @@ def folder(tmp_path_factory):
                 client, line("comment", question="why", text="x" * (LONGEST + 1))
             )
         answer(study, client, text)
-    assert stage(study, client)["debriefing"] == ["All were programs."]
+    assert stage(study, client)["debriefing"] == ["All were computers."]
     return out
 
 

@@ -123,7 +123,7 @@ def test_an_edit_of_another_file_is_never_stale(tmp_path, numba_folder):
     copy = tmp_path / "marl_airhockey"
     skip = shutil.ignore_patterns("zoo", "web", "__pycache__")
     shutil.copytree(PACKAGE, copy, ignore=skip)
-    for leaves in ("scenarios", "agents"):
+    for leaves in ("scenarios", "drivers"):
         (copy / leaves).mkdir()
     program = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r})\n"

@@ -8,7 +8,7 @@ import pytest
 import marl_airhockey as ah
 from marl_airhockey.envs.describe import summary
 from marl_airhockey.play.study.plan import Opponent
-from marl_airhockey.registry import find_scenario, make_agent
+from marl_airhockey.registry import find_scenario, make_driver
 from marl_airhockey.scenarios.reach import Reach
 
 DRIVER = """
@@ -60,9 +60,9 @@ def test_a_driver_of_a_file_or_a_module_drives(folder, name):
     world.reset(0)
     world.step(np.zeros((2, 0, 2)))
     assert (world.action == 0.5).all()
-    assert make_agent(name, share=0.2).share == 0.2
+    assert make_driver(name, share=0.2).share == 0.2
     with pytest.raises(ValueError, match="unknown option"):
-        make_agent(name, shair=0.2)
+        make_driver(name, shair=0.2)
 
 
 @pytest.mark.parametrize("name", ["my_task.py", "my_task.py:Slow", "my_task:Slow"])
@@ -119,7 +119,7 @@ def test_installed_packages_add_names(folder, monkeypatch):
     )
     monkeypatch.syspath_prepend(str(folder))
     assert ah.make_scenario("slow_reach").seconds == 20.0
-    assert make_agent("push:share=0.25").share == 0.25
+    assert make_driver("push:share=0.25").share == 0.25
     with pytest.raises(ValueError, match=r"lost \(broken:Task\): it cannot be"):
         ah.make_scenario("lost")
     with pytest.warns(RuntimeWarning, match="lost"):

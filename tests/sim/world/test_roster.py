@@ -3,7 +3,7 @@
 import numpy as np
 
 import marl_airhockey as ah
-from marl_airhockey.registry import make_agent
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.world.roster import Roster
 
 
@@ -14,7 +14,7 @@ def test_a_roster_plays_as_drivers_inside_do():
     two = ah.make_world("duel", 6, backend="numba")
     roster = Roster(two)
     for name in names:
-        roster.add(name, make_agent(name))
+        roster.add(name, make_driver(name))
     roster.seated[:] = [0, 1]
     one.autoreset = two.autoreset = False
     one.reset(3)
@@ -28,7 +28,7 @@ def test_a_roster_plays_as_drivers_inside_do():
     np.testing.assert_allclose(one.state.position, two.state.position, atol=1e-12)
 
 
-class Watching(type(make_agent("random"))):
+class Watching(type(make_driver("random"))):
     """Driver that keeps the observations it is given."""
 
     def act(self, view, memory):
@@ -53,7 +53,7 @@ def test_a_driver_observes_what_an_agent_at_its_seat_does():
 def test_who_sits_where_differs_by_world():
     world = ah.make_world("duel", 4, backend="numba")
     roster = Roster(world)
-    still, random = (roster.add(n, make_agent(n)) for n in ("still", "random"))
+    still, random = (roster.add(n, make_driver(n)) for n in ("still", "random"))
     roster.seated[:] = [[still, random], [random, still], [-1, random], [-1, -1]]
     world.reset(0)
     roster.begin(np.arange(4))

@@ -6,7 +6,7 @@ from pair import Pair
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.registry import agent_class, make_agent
+from marl_airhockey.registry import driver_class, make_driver
 from marl_airhockey.sim.core.rng import StreamSet
 
 
@@ -24,7 +24,7 @@ def play(scenario, agent, worlds, steps, seed, **keywords):
 def test_it_plays_every_scenario_finitely_and_repeatably(agent, scenario):
     bare = ah.make_world(scenario, 1)
     bare.reset(0)
-    if agent_class(agent).needs_goal and "goal" not in bare.memory:
+    if driver_class(agent).needs_goal and "goal" not in bare.memory:
         with pytest.raises(ValueError, match="no goal"):
             play(scenario, agent, 2, 1, 0)
         return
@@ -83,7 +83,7 @@ def test_a_script_is_an_honest_baseline(task, script, bar):
 
 
 def test_a_driver_keeps_its_own_pace():
-    driver = ah.make_agent("random")
+    driver = ah.make_driver("random")
     driver.control_dt = 0.15
     world = ah.make_world("reach", 2, drivers={"paddle_0": driver})
     world.reset(0)
@@ -100,7 +100,7 @@ def test_a_driver_keeps_its_own_pace():
 
 
 def test_a_prescribed_paddle_follows_its_driver():
-    class Hand(type(ah.make_agent("still"))):
+    class Hand(type(ah.make_driver("still"))):
         def measured(self):
             return np.array([[-0.5, 0.1, 0.2, 0.0]])
 
@@ -142,8 +142,8 @@ def test_a_stronger_opponent_plays_better(script):
 
 def test_options_of_a_driver_are_named_when_they_are_wrong():
     with pytest.raises(ValueError, match="unknown strength 'strog'"):
-        make_agent("striker:strength=strog")
+        make_driver("striker:strength=strog")
     with pytest.raises(ValueError, match="expected NAME=VALUE"):
-        make_agent("striker:weak")
+        make_driver("striker:weak")
     with pytest.raises(ValueError, match="power"):
-        make_agent("striker:power=weak")
+        make_driver("striker:power=weak")

@@ -30,7 +30,7 @@ class Ur5e(Driver):
     """Driver whose paddle is where the tool of an arm is: a digital twin.
 
     Without a policy it moves nothing: a person leads the arm in freedrive, or another
-    program commands it. With one, the policy's actions are sent to an emulated arm, in
+    driver commands it. With one, the policy's actions are sent to an emulated arm, in
     real time, and the simulated paddle follows what the arm does. On a real arm
     policies play with ``--backend real``, which watches the table, too.
 
