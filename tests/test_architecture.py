@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import tokenize
+from collections import Counter
 from itertools import pairwise
 from pathlib import Path
 
@@ -106,6 +107,17 @@ def test_names_use_standard_words():
         if PRIVATE_WORDS & set(re.split("_+", name.lower()))
     ]
     assert not found
+
+
+def test_no_class_name_exists_twice():
+    names = Counter(
+        node.name
+        for path in PACKAGE.rglob("*.py")
+        if path.parent.name != "templates"
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def test_every_fault_of_check_mutations_can_be_made():

@@ -16,7 +16,7 @@ from marl_airhockey.evaluation.challenge import (
     TASKS,
     play_challenge,
 )
-from marl_airhockey.evaluation.challenge_report import Result
+from marl_airhockey.evaluation.challenge_report import ChallengeResult
 from marl_airhockey.sim.core.errors import require
 
 
@@ -43,7 +43,7 @@ def challenge(
         total = len(TASKS) * len(PROFILES) + len(FIELD)
         task = progress.add_task("challenge", total=total, note="")
 
-        def report(result: Result) -> None:
+        def report(result: ChallengeResult) -> None:
             """Show the progress."""
             what = f"{result.scenario} {result.opponent or result.profile}"
             progress.update(task, advance=1, note=f"{what} {result.score:.2f}")

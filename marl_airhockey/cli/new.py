@@ -16,7 +16,7 @@ from marl_airhockey.registry import driver_names, plugin_names, scenario_names
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-class Kind(StrEnum):
+class TemplateKind(StrEnum):
     """Kind of file to begin with."""
 
     SCENARIO = "scenario"
@@ -24,7 +24,7 @@ class Kind(StrEnum):
 
 
 def new(
-    kind: Annotated[Kind, typer.Argument(help="What to write.")],
+    kind: Annotated[TemplateKind, typer.Argument(help="What to write.")],
     name: Annotated[str, typer.Argument(help="Name of it, like my_task.")],
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of the file.")
@@ -35,7 +35,7 @@ def new(
         raise ValueError(f"{name!r}: expected a name like my_task")
     if keyword.iskeyword(name) or find_spec(name) is not None:
         raise ValueError(f"{name}: Python has such a word or module; take another")
-    own = scenario_names() if kind is Kind.SCENARIO else driver_names()
+    own = scenario_names() if kind is TemplateKind.SCENARIO else driver_names()
     if name in {*own, *plugin_names(f"{kind}s")}:
         raise ValueError(f"{name}: there is a {kind} of this name; take another")
     if not out.is_dir():
@@ -49,7 +49,7 @@ def new(
     except FileExistsError:
         raise ValueError(f"{path}: there is such a file; take another name") from None
     console.print(f"wrote {path}; next:")
-    if kind is Kind.SCENARIO:
+    if kind is TemplateKind.SCENARIO:
         console.print(f"  airhockey list {path}")
         console.print(f"  airhockey evaluate random --scenario {path}")
         console.print(f"  airhockey train {path}")

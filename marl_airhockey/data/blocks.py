@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
-class Block(NamedTuple):
+class PendingSteps(NamedTuple):
     """Steps that wait to be written."""
 
     episode: int
@@ -28,7 +28,7 @@ class Block(NamedTuple):
     rows: Columns
 
 
-def step_table(blocks: Sequence[Block], names: Iterable[str]) -> pa.Table:
+def step_table(blocks: Sequence[PendingSteps], names: Iterable[str]) -> pa.Table:
     """Return the table of the steps of some blocks.
 
     Args:
@@ -77,7 +77,7 @@ class DiskWriter:
     def start(
         self,
         episodes: Sequence[dict[str, Any]],
-        blocks: Sequence[Block],
+        blocks: Sequence[PendingSteps],
         names: Iterable[str],
     ) -> None:
         """Have the thread write the rows of episodes, if there are any, and a part.
@@ -93,7 +93,7 @@ class DiskWriter:
     def _write(
         self,
         episodes: Sequence[dict[str, Any]],
-        blocks: Sequence[Block],
+        blocks: Sequence[PendingSteps],
         names: Sequence[str],
     ) -> None:
         if episodes:

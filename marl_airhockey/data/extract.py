@@ -14,7 +14,7 @@ import numpy as np
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import episodes_without_film
 from marl_airhockey.data.reader import read_recording
-from marl_airhockey.hardware.camera import FileSource, Frame
+from marl_airhockey.hardware.camera import CameraFrame, FileSource
 from marl_airhockey.hardware.camera.film import read_times
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.rig_file import rig_fields
@@ -158,7 +158,7 @@ def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
     return video, rig, times
 
 
-def _pictures(path: Path) -> Iterator[Frame]:
+def _pictures(path: Path) -> Iterator[CameraFrame]:
     """Give the pictures of a video, the time in s from its first one."""
     source = FileSource(path, realtime=False)
     source.open()
@@ -179,14 +179,14 @@ def _check_view(path: Path, rig: Rig) -> None:
         raise ValueError(f"{path}: {trouble}")
 
 
-def _spread(path: Path) -> list[Frame]:
+def _spread(path: Path) -> list[CameraFrame]:
     """Return some pictures from all over a video."""
     capture = cv2.VideoCapture(str(path))
     count = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     capture.release()
     # A film that was cut off does not tell how long it is.
     every = max(count // LOOKED, 1) if count > 0 else 15
-    found: list[Frame] = []
+    found: list[CameraFrame] = []
     for frame in _pictures(path):
         if frame.number % every == 0:
             found.append(frame)

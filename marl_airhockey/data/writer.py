@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from marl_airhockey.data.blocks import Block, DiskWriter
+from marl_airhockey.data.blocks import DiskWriter, PendingSteps
 from marl_airhockey.data.files import parent_of
 from marl_airhockey.data.parquet import EXTRA, warm_up
 from marl_airhockey.data.parts import merge_parts, parts_of
@@ -122,7 +122,7 @@ class RecordingWriter:
             for name, fields in head.get("columns", {}).items()
         }
         self._first: Columns | None = None
-        self._waiting: list[Block] = []
+        self._waiting: list[PendingSteps] = []
         self._count, self._step = 0, 0
         # The first calls of pyarrow take half a second.
         warm_up()
@@ -283,7 +283,7 @@ class RecordingWriter:
                     f"{name}: shape {value.shape[1:]} in a step, before {column.shape}"
                 )
             rows[name] = value.astype(column.dtype)
-        block = Block(len(self._episodes) - 1, self._step, count, rows)
+        block = PendingSteps(len(self._episodes) - 1, self._step, count, rows)
         self._waiting.append(block)
         self._step += count
         self._count += count

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
-from marl_airhockey.evaluation.challenge_report import ChallengeReport, Result
+from marl_airhockey.evaluation.challenge_report import ChallengeReport, ChallengeResult
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.evaluation.games import play_against
 from marl_airhockey.evaluation.stats import interval
@@ -67,7 +67,7 @@ def play_challenge(
     version: str,
     episodes: int = EPISODES,
     games: int = GAMES,
-    report: Callable[[Result], None] = lambda result: None,
+    report: Callable[[ChallengeResult], None] = lambda result: None,
 ) -> ChallengeReport:
     """Play the protocol.
 
@@ -100,11 +100,13 @@ def play_challenge(
 
 def _play(
     scenario: str, profile: str, opponent: str, player: str, episodes: int, games: int
-) -> Result:
+) -> ChallengeResult:
     """Play one task in one profile, or one opponent."""
 
-    def missing(note: str) -> Result:
-        return Result(scenario, profile, opponent, "", 0.0, 0.0, 0.0, 0.0, "", note)
+    def missing(note: str) -> ChallengeResult:
+        return ChallengeResult(
+            scenario, profile, opponent, "", 0.0, 0.0, 0.0, 0.0, "", note
+        )
 
     if not player:
         return missing("no policy of this name")
@@ -117,7 +119,9 @@ def _play(
             )
             score = float(found[0])
             ends = interval(score, games)
-            return Result(scenario, profile, opponent, shown, score, *ends, 0.0, "", "")
+            return ChallengeResult(
+                scenario, profile, opponent, shown, score, *ends, 0.0, "", ""
+            )
         task = evaluate(
             driver,
             scenario,
@@ -131,4 +135,6 @@ def _play(
         return missing(str(error))
     success, ends = task.success, task.success_interval
     first, grade = task.first_shot, task.deployability.grade
-    return Result(scenario, profile, "", shown, success, *ends, first, grade, "")
+    return ChallengeResult(
+        scenario, profile, "", shown, success, *ends, first, grade, ""
+    )

@@ -15,7 +15,7 @@ PROTOCOL = 2
 
 
 @dataclass(frozen=True)
-class Result:
+class ChallengeResult:
     """Result in one task and profile, or against one opponent."""
 
     scenario: str
@@ -50,7 +50,7 @@ class ChallengeReport:
     """Number of games against each opponent"""
     files: dict[str, str]
     """SHA-256 of the policies' files, by name"""
-    results: tuple[Result, ...]
+    results: tuple[ChallengeResult, ...]
     protocol: int = PROTOCOL
 
     @property
@@ -58,7 +58,9 @@ class ChallengeReport:
         """Profiles in which tasks were played."""
         return list(dict.fromkeys(r.profile for r in self.results if not r.opponent))
 
-    def total(self, keep: Callable[[Result], bool]) -> tuple[float, float, float]:
+    def total(
+        self, keep: Callable[[ChallengeResult], bool]
+    ) -> tuple[float, float, float]:
         """Return the mean score of some results, and its 95 % interval.
 
         The interval adds those of the results as independent errors.
@@ -96,7 +98,7 @@ class ChallengeReport:
         try:
             data = json.loads(text)
             data.pop("totals")
-            data["results"] = tuple(Result(**row) for row in data["results"])
+            data["results"] = tuple(ChallengeResult(**row) for row in data["results"])
             card = ChallengeReport(**data)
         except (KeyError, TypeError, json.JSONDecodeError) as error:
             raise ValueError(f"this is no card of a challenge: {error}") from error
@@ -147,11 +149,11 @@ class ChallengeReport:
         return files
 
 
-def _is_task(result: Result, profile: str) -> bool:
+def _is_task(result: ChallengeResult, profile: str) -> bool:
     return not result.opponent and result.profile == profile
 
 
-def _share(result: Result) -> str:
+def _share(result: ChallengeResult) -> str:
     return f"{result.score:.3f} ({result.low:.2f}..{result.high:.2f})"
 
 

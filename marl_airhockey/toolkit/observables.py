@@ -12,8 +12,8 @@ import numpy as np
 from marl_airhockey.sim.contracts.observable import (
     HISTORY,
     PENDING,
-    Column,
     EgoView,
+    Element,
     Observable,
     ObservationContext,
 )
@@ -31,14 +31,14 @@ class OwnPaddle(Observable):
     estimate or a history also the last actions, which may still be on their way.
     """
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         centre = float(np.mean([x for x, _ in scope.scene.seats[0].reach]))
         columns = scope.position_columns("own", (0.2, 0.2), centre)
         columns += scope.velocity_columns("own", scope.top_speed, scope.top_speed)
         if scope.observe != "velocity":
             for ago in range(PENDING, 0, -1):
                 names = (f"own.requested[-{ago}].{axis}" for axis in "xy")
-                columns += [Column(name, -1.0, 1.0, 1.0) for name in names]
+                columns += [Element(name, -1.0, 1.0, 1.0) for name in names]
         if scope.reaction:
             columns += scope.position_columns("own.delayed", (0.2, 0.2), centre)
             columns += scope.velocity_columns(
@@ -61,7 +61,7 @@ class OwnPaddle(Observable):
 class OtherPaddles(Observable):
     """Positions and velocities of the other paddles, teammates first, by ego angle."""
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         columns = []
         for i in range(len(scope.scene.seats) - 1):
             columns += scope.position_columns(f"other_{i}", (0.5, 0.2))
@@ -107,8 +107,8 @@ class Pucks(Observable):
     velocity, counter-clockwise.
     """
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
-        columns: list[Column] = []
+    def columns(self, scope: ObservationContext) -> list[Element]:
+        columns: list[Element] = []
         for i in range(scope.scene.pucks):
             if scope.observe == "history":
                 for ago in range(HISTORY - 1, -1, -1):
@@ -118,7 +118,7 @@ class Pucks(Observable):
             columns += scope.position_columns(f"puck_{i}", (0.67, 0.25))
             columns += scope.velocity_columns(f"puck_{i}", PUCK_SPEED_CAP, 1.4)
             most = PUCK_SPEED_CAP
-            columns.append(Column(f"puck_{i}.spin", -most, most, 0.5))
+            columns.append(Element(f"puck_{i}.spin", -most, most, 0.5))
             if scope.extrapolates:
                 columns += scope.position_columns(f"puck_{i}.predicted", (0.67, 0.25))
                 columns += scope.velocity_columns(f"puck_{i}.predicted", most, 1.4)
@@ -149,16 +149,19 @@ class Pucks(Observable):
         out[...] = both.reshape(out.shape)
 
 
-def _frame_columns(name: str) -> list[Column]:
+def _frame_columns(name: str) -> list[Element]:
     """Return the columns of what a camera says of a frame."""
-    return [Column(f"{name}.seen", 0.0, 1.0, 1.0), Column(f"{name}.age", 0.0, 1.0, 0.1)]
+    return [
+        Element(f"{name}.seen", 0.0, 1.0, 1.0),
+        Element(f"{name}.age", 0.0, 1.0, 0.1),
+    ]
 
 
 @dataclass(frozen=True)
 class OwnToPucks(Observable):
     """Vector from the seat's own paddle to every puck, with a reaction both as now."""
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"own_to_puck_{i}" for i in range(scope.scene.pucks)]
         return [c for name in names for c in scope.offset_columns(name, (0.25, 0.125))]
 
@@ -173,7 +176,7 @@ class Blocks(Observable):
     x: float
     """Typical x of blocks (m), the centre of the scaling."""
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"block_{i}" for i in range(scope.scene.blocks)]
         return [
             c
@@ -189,7 +192,7 @@ class Blocks(Observable):
 class PuckToBlocks(Observable):
     """Vector from puck 0 to every block."""
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"puck_0_to_block_{i}" for i in range(scope.scene.blocks)]
         return [c for name in names for c in scope.offset_columns(name, (1.0, 0.5))]
 
@@ -202,8 +205,8 @@ class PuckToBlocks(Observable):
 class Touched(Observable):
     """Flag: 1 after any paddle has touched any puck, else 0."""
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
-        return [Column("touched", 0.0, 1.0, 1.0)]
+    def columns(self, scope: ObservationContext) -> list[Element]:
+        return [Element("touched", 0.0, 1.0, 1.0)]
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[...] = touched(ego.memory)[..., None, None]
@@ -224,7 +227,7 @@ class Goal(Observable):
     """Name in the memory."""
     goal = True
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         position = scope.position_columns(self.name, self.unit, self.x)
         offset = scope.offset_columns(f"{self.origin}_to_{self.name}", self.unit)
         return position + offset
@@ -243,7 +246,7 @@ class GoalVelocity(Observable):
     unit: float
     goal = True
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         return scope.velocity_columns("goal", self.most, self.unit)
 
     def write(self, ego: EgoView, out: Array) -> None:
@@ -256,9 +259,9 @@ class PossessionTime(Observable):
 
     most: float
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"held_{i}" for i in range(scope.scene.pucks)]
-        return [Column(name, 0.0, self.most, 0.4 * self.most) for name in names]
+        return [Element(name, 0.0, self.most, 0.4 * self.most) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
         out[...] = ego.kept("held")
@@ -271,10 +274,10 @@ class PerSeat(Observable):
     name: str
     most: float
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         others = [f"other_{i}" for i in range(len(scope.scene.seats) - 1)]
         names = [f"{who}.{self.name}" for who in ("own", *others)]
-        return [Column(name, 0.0, self.most, self.most) for name in names]
+        return [Element(name, 0.0, self.most, self.most) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
         value = ego.kept(self.name)
@@ -291,9 +294,9 @@ class IsThisSeat(Observable):
 
     name: str
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"{self.name}_{i}" for i in range(scope.scene.pucks)]
-        return [Column(name, -1.0, 1.0, 1.0) for name in names]
+        return [Element(name, -1.0, 1.0, 1.0) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
         who = ego.kept(self.name)
@@ -313,9 +316,9 @@ class FromMemory(Observable):
     from_own: bool = False
     """True for a height relative to the own paddle."""
 
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         names = [f"{self.name}_{i}" for i in range(scope.scene.pucks)]
-        return [Column(name, self.low, self.high, self.unit) for name in names]
+        return [Element(name, self.low, self.high, self.unit) for name in names]
 
     def write(self, ego: EgoView, out: Array) -> None:
         kept, pucks = ego.kept(self.name), out.shape[-1]

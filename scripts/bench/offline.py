@@ -29,7 +29,7 @@ from torchrl.objectives import IQLLoss, SoftUpdate
 from marl_airhockey import make_driver
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.learn.offline.config import offline_config
-from marl_airhockey.learn.offline.dataset import Batch, load_dataset
+from marl_airhockey.learn.offline.dataset import StepBatch, load_dataset
 from marl_airhockey.learn.offline.learner import Learner
 from marl_airhockey.learn.run import TrainingRun
 
@@ -43,7 +43,7 @@ def make_ours(recording: Path, folder: Path) -> Callable[[int], object]:
     return Learner(TrainingRun(config, folder)).descend
 
 
-def make_theirs(steps: Batch) -> Callable[[int], object]:
+def make_theirs(steps: StepBatch) -> Callable[[int], object]:
     """Return TorchRL's step."""
     size = steps.observation.shape[1]
     network = nn.Sequential(MLP(size, 4, num_cells=HIDDEN), NormalParamExtractor())

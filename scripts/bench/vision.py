@@ -18,7 +18,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from marl_airhockey.hardware.camera import Frame
+from marl_airhockey.hardware.camera import CameraFrame
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import (
     Seen,
@@ -133,7 +133,7 @@ def measure(
     first: list[Sighting] = []
     for now, puck, velocity, picture in shots:
         began = time.process_time()
-        sighting = detector.find(Frame(picture, now, 0))
+        sighting = detector.find(CameraFrame(picture, now, 0))
         spent += time.process_time() - began
         if sighting is not None:
             found += 1

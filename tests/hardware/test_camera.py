@@ -12,8 +12,8 @@ import pytest
 from marl_airhockey.hardware.camera import (
     Camera,
     CameraError,
+    CameraFrame,
     FileSource,
-    Frame,
     StreamSource,
     SyntheticSource,
     open_source,
@@ -54,7 +54,7 @@ def test_a_stream_brings_frames_as_they_were():
         def send():
             client, _ = server.accept()
             with client:
-                client.sendall(pack_frame(Frame(image, 12.5, 7)))
+                client.sendall(pack_frame(CameraFrame(image, 12.5, 7)))
 
         threading.Thread(target=send).start()
         with Camera(StreamSource(server.getsockname()[1])) as camera:

@@ -12,9 +12,9 @@ from disks import largest_file
 
 from marl_airhockey.hardware.camera import (
     Camera,
+    CameraFrame,
     FileSource,
     Film,
-    Frame,
     SyntheticSource,
     film,
 )
@@ -124,7 +124,7 @@ def test_a_video_of_a_variable_rate_keeps_its_own_times(tmp_path):
     class Pausing(SyntheticSource):
         def read(self):
             time.sleep(next(pauses, 0.02))
-            return Frame(GREY, time.monotonic(), self._next())
+            return CameraFrame(GREY, time.monotonic(), self._next())
 
         def _next(self):
             self._count += 1

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from marl_airhockey.hardware.camera import Frame
+from marl_airhockey.hardware.camera import CameraFrame
 from marl_airhockey.hardware.lab.table_camera import (
     Seen,
     TableCamera,
@@ -62,7 +62,7 @@ def test_a_flying_puck_is_found_to_half_a_millimetre(camera, detector):
     for k, velocity in enumerate(speeds):
         place = rng.uniform([-0.3, -0.38], [0.92, 0.38])
         image = camera.photograph(Seen(place, velocity, HOME, STILL), k)
-        seen = detector.find(Frame(image, 1.0, k))
+        seen = detector.find(CameraFrame(image, 1.0, k))
         assert seen is not None
         errors.append(np.linalg.norm(seen.place - place))
     assert np.mean(errors) < 0.0006
@@ -79,7 +79,7 @@ def test_a_puck_half_under_the_arm_is_completed(camera, detector):
     for y in np.linspace(0.055, 0.085, 7):
         place = HOME + np.array([-0.12, y])
         image = camera.photograph(Seen(place, STILL, HOME, STILL))
-        seen = detector.find(Frame(image, 0.0, 0))
+        seen = detector.find(CameraFrame(image, 0.0, 0))
         if seen is not None and seen.share < 0.93:
             errors.append(np.linalg.norm(seen.place - place))
     assert errors
@@ -88,15 +88,17 @@ def test_a_puck_half_under_the_arm_is_completed(camera, detector):
 
 def test_no_puck_is_no_puck(camera, detector):
     image = camera.photograph(Seen(None, STILL, HOME, STILL))
-    assert detector.find(Frame(image, 0.0, 0)) is None
+    assert detector.find(CameraFrame(image, 0.0, 0)) is None
     under = camera.photograph(Seen(HOME - np.array([0.1, 0.0]), STILL, HOME, STILL))
-    assert detector.find(Frame(under, 0.0, 0)) is None
+    assert detector.find(CameraFrame(under, 0.0, 0)) is None
 
 
 def test_a_rolling_shutter_dates_each_row():
     lines = Detector(VIEW, Colour(0.0), 0.03, (1.0, 0.5), readout=0.01)
     image = np.zeros((480, 640, 3), np.uint8)
-    times = [lines._time(Frame(image, 5.0, 0), np.array([0.0, y])) for y in (0, 480)]
+    times = [
+        lines._time(CameraFrame(image, 5.0, 0), np.array([0.0, y])) for y in (0, 480)
+    ]
     np.testing.assert_allclose(times, [4.995, 5.005])
 
 
@@ -163,7 +165,7 @@ def test_a_second_puck_is_seen(camera, detector):
     puck = np.array([0.2, 0.1])
     camera.left = np.array([0.55, -0.25])
     seen = Seen(puck, STILL, HOME, STILL)
-    found = detector.find_all(Frame(camera.photograph(seen), 0.0, 0))
+    found = detector.find_all(CameraFrame(camera.photograph(seen), 0.0, 0))
     camera.left = None
     places = sorted(seen.place.tolist() for seen in found)
     np.testing.assert_allclose(places, [[0.2, 0.1], [0.55, -0.25]], atol=0.003)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from marl_airhockey.hardware.table.events import Track, find_contacts
+from marl_airhockey.hardware.table.events import MeasuredPuck, find_contacts
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array
@@ -39,8 +39,8 @@ def fill_events(state: State, scene: Scene, puck: Path, paddle: Path) -> None:
     central = np.gradient(puck.position, puck.time, axis=0)
     touching = False
     for k, (a, b) in enumerate(pairwise(rows)):
-        first = Track(float(puck.time[k]), puck.position[k], before[k])
-        last = Track(float(puck.time[k + 1]), puck.position[k + 1], after[k + 1])
+        first = MeasuredPuck(float(puck.time[k]), puck.position[k], before[k])
+        last = MeasuredPuck(float(puck.time[k + 1]), puck.position[k + 1], after[k + 1])
         way = slice(a, b + 1)
         met = find_contacts(scene, first, last, paddle.time[way], paddle.position[way])
         touches = bool(np.isfinite(met.paddle_at))

@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from marl_airhockey.hardware.calibration.motion import Motion, lead
+from marl_airhockey.hardware.calibration.motion import RecordedMotion, lead
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot
 from marl_airhockey.sim.core.seat import make_seat
@@ -126,7 +126,7 @@ def chirp(now: float) -> tuple[float, float]:
     return float(size * np.sin(phase)), float(CHIRP_SPEED * np.cos(phase))
 
 
-def find_lag(motion: Motion, axis: int, name: str) -> ArmTrial:
+def find_lag(motion: RecordedMotion, axis: int, name: str) -> ArmTrial:
     """Fit the model to a motion along an axis.
 
     Args:

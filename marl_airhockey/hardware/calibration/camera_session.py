@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from marl_airhockey.hardware.camera import Camera, Frame
+from marl_airhockey.hardware.camera import Camera, CameraFrame
 from marl_airhockey.hardware.vision import Colour, Detector
 from marl_airhockey.hardware.vision.boards import (
     LEAST_VIEWS,
@@ -224,17 +224,17 @@ class CameraSession:
         colour = need(self.found.paddle, "the paddle's colour")
         return self._detector(colour, self._radius, PADDLE_TOP)
 
-    def _frame(self) -> Frame:
+    def _frame(self) -> CameraFrame:
         return self._frames(1)[0]
 
-    def _frames(self, count: int) -> list[Frame]:
+    def _frames(self, count: int) -> list[CameraFrame]:
         """Return the next frames.
 
         Raises:
             ValueError: No frames arrive.
         """
         newest = self._camera.newest
-        frames: list[Frame] = []
+        frames: list[CameraFrame] = []
         while len(frames) < count:
             last = frames[-1] if frames else newest
             frame = self._camera.next(last.number if last else -1)

@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from marl_airhockey.hardware.camera import Camera, Frame, open_source
+from marl_airhockey.hardware.camera import Camera, CameraFrame, open_source
 from marl_airhockey.hardware.hand_rig import HandRig
 from marl_airhockey.hardware.lab.camera import PADDLE_TOP
 from marl_airhockey.hardware.lab.hand_camera import FIELD, hand_tag_places, hand_view
@@ -131,7 +131,7 @@ def calibrate_hand(client: LabClient) -> HandRig:
     )
 
 
-def _steady_tags(frames: list[Frame]) -> dict[int, Array]:
+def _steady_tags(frames: list[CameraFrame]) -> dict[int, Array]:
     """Return the mean corners (4, 2), px, of the tags that are seen in all frames."""
     seen = [find_tags(frame.image) for frame in frames]
     steady = set(seen[0]).intersection(*seen[1:])
@@ -183,8 +183,8 @@ def hand_rig() -> Iterator[Path]:
         yield path
 
 
-def _take(camera: Camera, count: int) -> list[Frame]:
-    frames: list[Frame] = []
+def _take(camera: Camera, count: int) -> list[CameraFrame]:
+    frames: list[CameraFrame] = []
     while len(frames) < count:
         frame = camera.next(frames[-1].number if frames else -1)
         if frame is None:

@@ -17,7 +17,7 @@ PERIOD = 0.004
 """Time between two commands, s: half of the driver's period"""
 
 
-class Motion(NamedTuple):
+class RecordedMotion(NamedTuple):
     """Motion of the arm; times are of the monotonic clock."""
 
     reported: Array
@@ -32,7 +32,7 @@ def lead(
     path: Callable[[float], tuple[Array, Array]],
     seconds: float,
     tell: Callable[[float], None] = lambda now: None,
-) -> Motion:
+) -> RecordedMotion:
     """Move the arm along a path and return the motion.
 
     Args:
@@ -66,7 +66,9 @@ def lead(
         tell(now)
         time.sleep(PERIOD)
     robot.disable()
-    return Motion(_in_order(np.concatenate(reported)), _in_order(np.array(sent)))
+    return RecordedMotion(
+        _in_order(np.concatenate(reported)), _in_order(np.array(sent))
+    )
 
 
 def _in_order(rows: Array) -> Array:

@@ -3,7 +3,12 @@
 A `Camera` keeps only the newest frame, so that a slow reader gets no outdated one.
 """
 
-from marl_airhockey.hardware.camera.camera import Camera, CameraError, Frame, Source
+from marl_airhockey.hardware.camera.camera import (
+    Camera,
+    CameraError,
+    CameraFrame,
+    Source,
+)
 from marl_airhockey.hardware.camera.film import Film
 from marl_airhockey.hardware.camera.sources import (
     FileSource,
@@ -17,11 +22,11 @@ __all__ = [
     "LATENCY",
     "Camera",
     "CameraError",
+    "CameraFrame",
     "CaptureSettings",
     "CapturedSource",
     "FileSource",
     "Film",
-    "Frame",
     "Source",
     "StreamSource",
     "SyntheticSource",

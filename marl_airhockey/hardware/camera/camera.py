@@ -20,7 +20,7 @@ class CameraError(RuntimeError):
     """Error of a camera that delivers no frames."""
 
 
-class Frame(NamedTuple):
+class CameraFrame(NamedTuple):
     """Frame of a camera."""
 
     image: Array
@@ -43,7 +43,7 @@ class Source(Protocol):
             CameraError: There is nothing to read; the message names a fix.
         """
 
-    def read(self) -> Frame | None:
+    def read(self) -> CameraFrame | None:
         """Wait for the next frame and return it; None at the end."""
 
     def close(self) -> None:
@@ -62,7 +62,7 @@ class Camera:
     def __init__(self, source: Source) -> None:
         self._source = source
         self._new = threading.Condition()
-        self._frame: Frame | None = None
+        self._frame: CameraFrame | None = None
         self._closing = False
         self._thread: threading.Thread | None = None
         self._error = ""
@@ -71,7 +71,7 @@ class Camera:
         self.dropped = 0
         """Number of frames that `next` did not return before a newer one came."""
         self._taken = -1
-        self.listeners: list[Callable[[Frame], None]] = []
+        self.listeners: list[Callable[[CameraFrame], None]] = []
         """Functions that get every frame, in the reading thread; they must return
         immediately."""
 
@@ -118,7 +118,7 @@ class Camera:
             self._error = str(error)
 
     @property
-    def newest(self) -> Frame | None:
+    def newest(self) -> CameraFrame | None:
         """Newest frame, which still counts as dropped; None before the first."""
         return self._frame
 
@@ -139,7 +139,7 @@ class Camera:
             return f"camera: no frame for {self.age:.2f} s"
         return ""
 
-    def next(self, after: int = -1, seconds: float = 1.0) -> Frame | None:
+    def next(self, after: int = -1, seconds: float = 1.0) -> CameraFrame | None:
         """Wait for a frame with a number above ``after`` and return the newest one.
 
         Return None if none arrives within ``seconds``.

@@ -17,7 +17,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from marl_airhockey.hardware.camera.camera import Camera, Frame
+from marl_airhockey.hardware.camera.camera import Camera, CameraFrame
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.types import Array
 
@@ -72,7 +72,7 @@ class Film:
         import av  # noqa: F401  The first import takes a tenth of a second.
 
         self._camera, self._path = camera, path
-        self._waiting: SimpleQueue[Frame | None] = SimpleQueue()
+        self._waiting: SimpleQueue[CameraFrame | None] = SimpleQueue()
         self._dropped = 0
         self._container: Any = None
         self._stream: Any = None
@@ -104,7 +104,7 @@ class Film:
             )
         return ""
 
-    def _take(self, frame: Frame) -> None:
+    def _take(self, frame: CameraFrame) -> None:
         if self._failure:
             return
         if self._waiting.qsize() < MOST:
@@ -121,7 +121,7 @@ class Film:
             # What is written stays.
             self._failure = error.strerror or str(error)
 
-    def _append(self, frame: Frame) -> None:
+    def _append(self, frame: CameraFrame) -> None:
         """Append a frame and its time.
 
         Raises:
@@ -150,7 +150,7 @@ class Film:
             self._times.write(f"{self._last[1]:.6f}\n")
             self._kept += 1
 
-    def _open(self, first: Frame) -> None:
+    def _open(self, first: CameraFrame) -> None:
         """Open the file for frames like the first."""
         import av
 

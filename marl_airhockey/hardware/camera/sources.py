@@ -14,7 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from marl_airhockey.hardware.camera.camera import CameraError, Frame, Source
+from marl_airhockey.hardware.camera.camera import CameraError, CameraFrame, Source
 from marl_airhockey.hardware.camera.v4l2 import (
     LATENCY,
     CapturedSource,
@@ -50,7 +50,7 @@ class FileSource:
         """Mean number of frames a second."""
         self._began = time.monotonic() if self._realtime else 0.0
 
-    def read(self) -> Frame | None:
+    def read(self) -> CameraFrame | None:
         found, image = self._capture.read()
         if not found:
             return None
@@ -58,7 +58,7 @@ class FileSource:
         if self._realtime:
             time.sleep(max(due - time.monotonic(), 0.0))
         self._count += 1
-        return Frame(image, due, self._count - 1)
+        return CameraFrame(image, due, self._count - 1)
 
     def _position(self) -> float:
         """Return the time of the frame that was read, s since the first."""
@@ -95,7 +95,7 @@ class StreamSource:
             ) from error
         self._socket.settimeout(None)
 
-    def read(self) -> Frame | None:
+    def read(self) -> CameraFrame | None:
         head = self._take(HEADER.size)
         if head is None:
             return None
@@ -107,7 +107,7 @@ class StreamSource:
         body = self._take(height * width * 3)
         if body is None:
             return None
-        return Frame(
+        return CameraFrame(
             np.frombuffer(body, np.uint8).reshape(height, width, 3), taken, number
         )
 
@@ -150,18 +150,18 @@ class SyntheticSource:
     def open(self) -> None:
         self._due = time.monotonic()
 
-    def read(self) -> Frame | None:
+    def read(self) -> CameraFrame | None:
         self._due += self._period
         if self._ended.wait(max(self._due - time.monotonic(), 0.0)):
             return None
         self._count += 1
-        return Frame(self._draw(self._due), self._due, self._count - 1)
+        return CameraFrame(self._draw(self._due), self._due, self._count - 1)
 
     def close(self) -> None:
         self._ended.set()
 
 
-def pack_frame(frame: Frame) -> bytes:
+def pack_frame(frame: CameraFrame) -> bytes:
     """Return the bytes of a frame in a stream."""
     height, width, _ = frame.image.shape
     head = HEADER.pack(MAGIC, frame.number, frame.taken, height, width)

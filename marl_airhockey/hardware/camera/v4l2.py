@@ -17,7 +17,7 @@ from typing import Any
 
 import cv2
 
-from marl_airhockey.hardware.camera.camera import CameraError, Frame
+from marl_airhockey.hardware.camera.camera import CameraError, CameraFrame
 
 LATENCY = 0.025
 """Latency without a measurement, from the middle of an exposure until its frame has
@@ -186,12 +186,12 @@ class CapturedSource:
         finally:
             os.close(descriptor)
 
-    def read(self) -> Frame | None:
+    def read(self) -> CameraFrame | None:
         found, image = self._capture.read()
         if not found:
             raise CameraError(f"{self._path} delivers no more frames")
         self._count += 1
-        return Frame(image, self._arrival() - self._latency, self._count - 1)
+        return CameraFrame(image, self._arrival() - self._latency, self._count - 1)
 
     def _arrival(self) -> float:
         """Return the time at which the frame that was read arrives if nothing waits, s.

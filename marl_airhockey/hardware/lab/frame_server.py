@@ -7,7 +7,7 @@ import threading
 import time
 from queue import SimpleQueue
 
-from marl_airhockey.hardware.camera.camera import Frame
+from marl_airhockey.hardware.camera.camera import CameraFrame
 from marl_airhockey.hardware.camera.sources import pack_frame
 
 
@@ -22,7 +22,7 @@ class FrameServer:
 
     def __init__(self, latency: float) -> None:
         self.latency = latency
-        self._waiting: SimpleQueue[Frame] = SimpleQueue()
+        self._waiting: SimpleQueue[CameraFrame] = SimpleQueue()
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._listener.getsockname()[1])
         self._new = threading.Condition()
@@ -35,7 +35,7 @@ class FrameServer:
         """True while there are clients."""
         return self._clients > 0
 
-    def send(self, frame: Frame) -> None:
+    def send(self, frame: CameraFrame) -> None:
         """Send a frame to all clients when it is due."""
         self._waiting.put(frame)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from marl_airhockey.hardware.camera.camera import Frame
+from marl_airhockey.hardware.camera.camera import CameraFrame
 from marl_airhockey.hardware.lab.frame_server import FrameServer
 from marl_airhockey.hardware.lab.hand_camera import HandCamera, SeenHand, hand_view
 from marl_airhockey.hardware.lab.setup import LabSetup
@@ -62,7 +62,7 @@ def run_hand(setup: LabSetup, frame_rate: float, seed: int, pipe: Connection) ->
         if server.watched:
             position, velocity = path.at(due)
             seen = SeenHand(None if path.away else position, velocity)
-            server.send(Frame(camera.photograph(seen, number), due, number))
+            server.send(CameraFrame(camera.photograph(seen, number), due, number))
 
 
 def path_of(order: dict[str, Any]) -> HandPath:

@@ -10,7 +10,7 @@ import numpy as np
 from marl_airhockey.hardware.robot.kinematics import inverse, pose_of
 from marl_airhockey.hardware.robot.mounting import Mounting
 from marl_airhockey.hardware.robot.nominal import TILT, nominal_mounting
-from marl_airhockey.hardware.ur_emulator.arm import Arm
+from marl_airhockey.hardware.ur_emulator.arm import EmulatedArm
 from marl_airhockey.hardware.ur_emulator.plant import EmptyTable, Plant
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.seat import Seat, make_seat
@@ -66,7 +66,7 @@ class LabSetup:
         normal = np.array(self.mounting.rotation)[:, 2]
         return EmptyTable(np.array(self.mounting.origin), normal)
 
-    def make_arm(self, plant: Plant | None = None) -> Arm:
+    def make_arm(self, plant: Plant | None = None) -> EmulatedArm:
         """Return the arm with its paddle above its home position.
 
         Args:
@@ -82,4 +82,4 @@ class LabSetup:
         found, angles = inverse(flange, np.array(ELBOW_UP), 200)
         if not found:
             raise ValueError(f"the arm does not reach {self.home} m on {self.table}")
-        return Arm(angles, np.array(TOOL), plant or self.make_table())
+        return EmulatedArm(angles, np.array(TOOL), plant or self.make_table())

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from marl_airhockey.hardware.block import Block
-from marl_airhockey.hardware.camera.camera import Frame
+from marl_airhockey.hardware.camera.camera import CameraFrame
 from marl_airhockey.hardware.lab.frame_server import FrameServer
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.lab.table_camera import Seen, TableCamera, lab_view
@@ -118,7 +118,7 @@ class TableLoop:
         if self._steps % self._every == 0 and not self._frozen:
             self._server.send(self._photograph(now, paddle, velocity))
 
-    def _photograph(self, now: float, paddle: Any, velocity: Any) -> Frame:
+    def _photograph(self, now: float, paddle: Any, velocity: Any) -> CameraFrame:
         world = self.world
         moving = np.zeros(2) if world.held else world.puck_velocity
         puck = world.puck if world.present else None
@@ -127,7 +127,7 @@ class TableLoop:
         again = self._stuck or (self._repeats and self._frames % 2)
         if not (again and self._image.size):
             self._image = self._camera.photograph(seen, self._frames)
-        return Frame(self._image, now, self._frames)
+        return CameraFrame(self._image, now, self._frames)
 
     def obey(self, order: dict[str, Any]) -> dict[str, Any]:
         """Carry out an order of the lab's operator; return the true state."""

@@ -30,7 +30,7 @@ from marl_airhockey.hardware.robot.motion import Motion
 from marl_airhockey.hardware.robot.supervisor import (
     AWAY,
     LIFTED,
-    Measured,
+    Readings,
     Supervisor,
 )
 from marl_airhockey.sim.core.geometry import half_planes
@@ -125,7 +125,7 @@ class ArmDriver:
         if before is not DriverState.FAULT:
             # A confirmation is valid only for a stop that the operator could see.
             self._recovered = request.recover
-        measured = Measured(
+        measured = Readings(
             float(position[2]),
             self._motion.measure(reading.stamp, position),
             not self._motion.shaper.at_rest,

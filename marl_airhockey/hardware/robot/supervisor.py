@@ -50,7 +50,7 @@ LATCHED = (Fault.PADDLE_LIFTED, Fault.PADDLE_BELOW_TABLE, Fault.DEVIATION)
 log = logging.getLogger("marl_airhockey.robot")
 
 
-class Measured(NamedTuple):
+class Readings(NamedTuple):
     """Quantities that a supervisor looks at in a cycle."""
 
     height: float
@@ -108,7 +108,7 @@ class Supervisor:
         """Return True if the robot has sent no news for too long."""
         return now - self._heard > SILENT
 
-    def watch_arm(self, now: float, reading: Reading, measured: Measured) -> None:
+    def watch_arm(self, now: float, reading: Reading, measured: Readings) -> None:
         """Enter FAULT if the arm is silent or has stopped."""
         if reading.stamp != self._stamp:
             self._stamp, self._heard = reading.stamp, now
@@ -144,7 +144,7 @@ class Supervisor:
         if lost or reading.fault is ArmFault.EMERGENCY_STOP:
             self.fail(now, Fault(reading.fault))
 
-    def watch_request(self, now: float, request: Request, measured: Measured) -> None:
+    def watch_request(self, now: float, request: Request, measured: Readings) -> None:
         """Enter READY, RUNNING or HOLD, as the caller's request says."""
         if self.state is DriverState.FAULT:
             return

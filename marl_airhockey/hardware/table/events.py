@@ -16,7 +16,7 @@ from marl_airhockey.sim.sensing.contacts import MARGIN, MOMENTS, contact_time
 from marl_airhockey.types import Array
 
 
-class Track(NamedTuple):
+class MeasuredPuck(NamedTuple):
     """Puck at one time."""
 
     time: float
@@ -27,7 +27,7 @@ class Track(NamedTuple):
     """(2,) m/s"""
 
 
-class Contacts(NamedTuple):
+class MeasuredContacts(NamedTuple):
     """Contacts of a puck between two times."""
 
     paddle_at: float
@@ -39,8 +39,8 @@ class Contacts(NamedTuple):
 
 
 def find_contacts(
-    scene: Scene, before: Track, after: Track, times: Array, paddle: Array
-) -> Contacts:
+    scene: Scene, before: MeasuredPuck, after: MeasuredPuck, times: Array, paddle: Array
+) -> MeasuredContacts:
     """Return the contacts of a puck between two sightings.
 
     Args:
@@ -66,4 +66,4 @@ def find_contacts(
     beyond = (room_on[:half].min(0) < 0) | (room_back[half - 1 :].min(0) < 0)
     beyond |= (room_on.min(0) < 0) & (away > 0)
     banks = beyond & (toward > 0) & (away > -1e-3)
-    return Contacts(at, banks, before.velocity)
+    return MeasuredContacts(at, banks, before.velocity)

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from marl_airhockey.hardware.table.events import Track, find_contacts
+from marl_airhockey.hardware.table.events import MeasuredPuck, find_contacts
 from marl_airhockey.hardware.table.innovations import Innovations
 from marl_airhockey.hardware.vision import Sighting
 from marl_airhockey.sim.core.physics import Physics
@@ -35,7 +35,7 @@ class Tracker:
         self._scene = scene
         self._estimator = Estimator(scene, 1, physics, SPACING)
         self._touching = False
-        self.last: Track | None = None
+        self.last: MeasuredPuck | None = None
         """Newest sighting, filtered; None before an episode begins."""
         self.noise = 0.0
         """Mean distance of the sightings from the filtered positions, m."""
@@ -65,7 +65,7 @@ class Tracker:
             velocity.reshape(1, 1, 2),
             np.full((1, 1), last.taken),
         )
-        self.last = Track(last.taken, last.place, velocity)
+        self.last = MeasuredPuck(last.taken, last.place, velocity)
 
     @property
     def estimate(self) -> Array | None:
@@ -117,7 +117,7 @@ class Tracker:
         # The filtered position at the time of the frame itself.
         self._update(sighting.place, taken, True, track, taken)
         found = self._estimator.now[0, 0]
-        new = self.last = Track(taken, found[:2].copy(), found[2:4].copy())
+        new = self.last = MeasuredPuck(taken, found[:2].copy(), found[2:4].copy())
         off = float(np.linalg.norm(new.place - sighting.place))
         self.noise += SMOOTHED * (off - self.noise)
         if last is None:

@@ -48,7 +48,7 @@ SCALING_RATE = 4.0
 
 
 @dataclass
-class Arm:
+class EmulatedArm:
     """Arm of six joints, moved by a step of `DT`.
 
     What moves it is its ``motion``; a motion that joints cannot follow, or that is too

@@ -12,7 +12,7 @@ from sys import stderr
 from typing import Any
 
 from marl_airhockey.hardware.robot.kinematics import pose_vector
-from marl_airhockey.hardware.ur_emulator.arm import DT, Arm
+from marl_airhockey.hardware.ur_emulator.arm import DT, EmulatedArm
 from marl_airhockey.hardware.ur_emulator.safety import SAFETY_BITS, Safety
 from marl_airhockey.hardware.ur_emulator.script import ControlScript
 
@@ -48,7 +48,9 @@ class Controller:
         version: Version of PolyScope that it reports.
     """
 
-    def __init__(self, arm: Arm, version: tuple[int, int, int, int] = VERSION) -> None:
+    def __init__(
+        self, arm: EmulatedArm, version: tuple[int, int, int, int] = VERSION
+    ) -> None:
         self.arm, self.script, self.version = arm, ControlScript(arm), version
         arm.rehearse()
         self.ticks = 0

@@ -35,7 +35,7 @@ SLOW = 0.1
 """Fraction to which somebody turns the speed slider"""
 
 
-class Fault(NamedTuple):
+class EmulatorFault(NamedTuple):
     """Fault."""
 
     what: str
@@ -142,62 +142,72 @@ def _powered_off(controller: Controller, on: bool) -> None:
 
 
 FAULTS = {
-    "protective_stop": Fault("the arm stops as after a collision", _protective_stop),
-    "emergency_stop": Fault("somebody presses the red button", _emergency_stop),
-    "silent_robot": Fault("the controller sends no more data", _silent),
-    "delayed_packets": Fault("data of the controller come 0.1 s late", _delayed),
-    "dropped_connection": Fault("RTDE connections are closed, and refused", _dropped),
-    "loss_of_real_time": Fault("programs and data stall for 80 ms twice a s", _stalled),
-    "puck_under_paddle": Fault("the paddle is lifted by 6 mm", _raised),
-    "speed_slider": Fault("somebody turns the speed slider to 10 %", _slowed),
-    "local_control": Fault("the pendant is switched to local control", _local),
-    "power_off": Fault("the arm has no power; its brakes hold it", _powered_off),
-    "servo_lag": Fault(
+    "protective_stop": EmulatorFault(
+        "the arm stops as after a collision", _protective_stop
+    ),
+    "emergency_stop": EmulatorFault("somebody presses the red button", _emergency_stop),
+    "silent_robot": EmulatorFault("the controller sends no more data", _silent),
+    "delayed_packets": EmulatorFault(
+        "data of the controller come 0.1 s late", _delayed
+    ),
+    "dropped_connection": EmulatorFault(
+        "RTDE connections are closed, and refused", _dropped
+    ),
+    "loss_of_real_time": EmulatorFault(
+        "programs and data stall for 80 ms twice a s", _stalled
+    ),
+    "puck_under_paddle": EmulatorFault("the paddle is lifted by 6 mm", _raised),
+    "speed_slider": EmulatorFault("somebody turns the speed slider to 10 %", _slowed),
+    "local_control": EmulatorFault("the pendant is switched to local control", _local),
+    "power_off": EmulatorFault(
+        "the arm has no power; its brakes hold it", _powered_off
+    ),
+    "servo_lag": EmulatorFault(
         "the arm follows four times as late",
         _lagging,
         "Universal_Robots_Client_Library issue 86",
     ),
-    "force_drift": Fault(
+    "force_drift": EmulatorFault(
         "the force sensor reports 6 N too much",
         _drifting,
         "Universal Robots forum 41657",
     ),
-    "wrong_payload": Fault(
+    "wrong_payload": EmulatorFault(
         "the payload at the pendant is 1 kg too low",
         _overweight,
         "ros-industrial/universal_robot issue 102",
     ),
-    "slider_at_zero": Fault(
+    "slider_at_zero": EmulatorFault(
         "another client moves the speed slider to 0",
         _stopped_slider,
         "Universal_Robots_ROS_Driver issues 191 and 195",
     ),
-    "extrapolated_poses": Fault(
+    "extrapolated_poses": EmulatorFault(
         "the controller extrapolates poses that come late",
         _extrapolated,
         "Universal_Robots_ROS2_Driver issue 534",
     ),
-    "speed_check": Fault(
+    "speed_check": EmulatorFault(
         "a pose that calls for a joint above 180 deg/s ends the program",
         _checked,
         "Universal_Robots_Client_Library PR 273",
     ),
-    "impatient_program": Fault(
+    "impatient_program": EmulatorFault(
         "the program ends after 40 ms without a command",
         _impatient,
         "Universal_Robots_Client_Library issue 423",
     ),
-    "forgotten_recipes": Fault(
+    "forgotten_recipes": EmulatorFault(
         "a client that connects again gets no data",
         _forgetful,
         "Universal_Robots_Client_Library PR 384",
     ),
-    "late_state": Fault(
+    "late_state": EmulatorFault(
         "the first data comes 1 s after a client has connected",
         _late_state,
         "ur_modern_driver issue 206",
     ),
-    "carried_arm": Fault(
+    "carried_arm": EmulatorFault(
         "a person stops the program and moves the arm away",
         _carried,
         "Universal_Robots_ROS2_Driver issue 800",

@@ -14,7 +14,7 @@ from collections.abc import Callable, Generator
 import numpy as np
 
 from marl_airhockey.hardware.robot.kinematics import forward, pose_of, pose_vector
-from marl_airhockey.hardware.ur_emulator.arm import DT, Arm
+from marl_airhockey.hardware.ur_emulator.arm import DT, EmulatedArm
 from marl_airhockey.hardware.ur_emulator.motions import (
     Force,
     Halt,
@@ -55,7 +55,7 @@ class ControlScript:
         arm: Arm that it moves.
     """
 
-    def __init__(self, arm: Arm) -> None:
+    def __init__(self, arm: EmulatedArm) -> None:
         self.arm = arm
         self.inputs_int, self.inputs_double = [0] * 48, np.zeros(48)
         self.outputs_int, self.outputs_double = [0] * 48, np.zeros(48)

@@ -14,7 +14,11 @@ from marl_airhockey.hardware.robot.limits import (
     JOINT_DATA,
     STATE,
 )
-from marl_airhockey.hardware.ur_emulator.arm import JOINT_ACCELERATION, JOINT_SPEED, Arm
+from marl_airhockey.hardware.ur_emulator.arm import (
+    JOINT_ACCELERATION,
+    JOINT_SPEED,
+    EmulatedArm,
+)
 
 VERSION_MESSAGE = 20
 """Number of the first message, whose contents nobody reads here"""
@@ -27,7 +31,7 @@ def message(kind: int, body: bytes) -> bytes:
     return struct.pack(">iB", len(body) + 5, kind) + body
 
 
-def state_of(arm: Arm) -> bytes:
+def state_of(arm: EmulatedArm) -> bytes:
     """Return the message of an arm: its joints and what they may."""
     joints = [
         JOINT.pack(angle, aim, speed, 0.0, 0.0, 0.0, 0.0, 253)

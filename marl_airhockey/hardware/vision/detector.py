@@ -10,7 +10,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from marl_airhockey.hardware.camera.camera import Frame
+from marl_airhockey.hardware.camera.camera import CameraFrame
 from marl_airhockey.hardware.vision.colour import Colour
 from marl_airhockey.hardware.vision.lens import CameraView
 from marl_airhockey.types import Array
@@ -54,11 +54,11 @@ class Detector:
     """Time from the exposure of the first row to that of the last, s, for a camera with
     a rolling shutter"""
 
-    def find(self, frame: Frame) -> Sighting | None:
+    def find(self, frame: CameraFrame) -> Sighting | None:
         """Return the largest disc of the colour; None without one."""
         return next(self._discs(frame), None)
 
-    def find_all(self, frame: Frame) -> list[Sighting]:
+    def find_all(self, frame: CameraFrame) -> list[Sighting]:
         """Return all discs of the colour.
 
         Two visible parts of one disc count once, as their completed discs overlap.
@@ -72,7 +72,7 @@ class Detector:
                 found.append(seen)
         return found
 
-    def _discs(self, frame: Frame) -> Iterator[Sighting]:
+    def _discs(self, frame: CameraFrame) -> Iterator[Sighting]:
         """Yield the discs among the three largest areas of the colour."""
         x, y, right, bottom = self._part
         image = frame.image[y:bottom, x:right]
@@ -84,7 +84,7 @@ class Detector:
                 position, pixel, share = found
                 yield Sighting(position, self._time(frame, pixel), share, pixel)
 
-    def _time(self, frame: Frame, pixel: Array) -> float:
+    def _time(self, frame: CameraFrame, pixel: Array) -> float:
         rows = frame.image.shape[0]
         return float(frame.taken + self.readout * (float(pixel[1]) / rows - 0.5))
 

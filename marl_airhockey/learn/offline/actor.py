@@ -10,7 +10,7 @@ from torch import Tensor
 
 from marl_airhockey.learn.networks import HALF_LOG_TAU, GaussianActor
 from marl_airhockey.learn.offline.config import OfflineConfig
-from marl_airhockey.learn.offline.dataset import Batch
+from marl_airhockey.learn.offline.dataset import StepBatch
 
 
 class Algorithm(GaussianActor, ABC):
@@ -34,7 +34,7 @@ class Algorithm(GaussianActor, ABC):
         return density
 
     @abstractmethod
-    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
+    def losses(self, step: int, batch: StepBatch) -> dict[str, Tensor]:
         """Return the losses, whose sum is descended on, by name.
 
         Args:

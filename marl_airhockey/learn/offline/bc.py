@@ -6,13 +6,13 @@ import torch
 from torch import Tensor
 
 from marl_airhockey.learn.offline.actor import Algorithm
-from marl_airhockey.learn.offline.dataset import Batch
+from marl_airhockey.learn.offline.dataset import StepBatch
 
 
 class BehaviourCloning(Algorithm):
     """Behaviour cloning; ``share`` below 1 clones the best episodes alone."""
 
-    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
+    def losses(self, step: int, batch: StepBatch) -> dict[str, Tensor]:
         error = (self.actor(batch.observation) - batch.action).square()
         # The deviation is that of the errors; the actor does not care.
         spread = torch.exp(2 * self.log_std)

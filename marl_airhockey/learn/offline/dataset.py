@@ -24,7 +24,7 @@ NEEDED = ("observation", *GOALS, "action", "reward", "terminated")
 """Columns that are read"""
 
 
-class Batch(NamedTuple):
+class StepBatch(NamedTuple):
     """Batch of n steps of one seat."""
 
     observation: Tensor
@@ -45,7 +45,7 @@ class Batch(NamedTuple):
 class Dataset:
     """Dataset of N steps of one seat."""
 
-    steps: Batch
+    steps: StepBatch
     """All N steps"""
     reward_scale: float
     """Standard deviation of the discounted returns from all steps on"""
@@ -53,10 +53,10 @@ class Dataset:
     def __len__(self) -> int:
         return len(self.steps.action)
 
-    def sample(self, count: int) -> Batch:
+    def sample(self, count: int) -> StepBatch:
         """Return ``count`` steps, sampled with replacement."""
         rows = torch.randint(len(self), (count,))
-        return Batch(*(x.index_select(0, rows) for x in self.steps))
+        return StepBatch(*(x.index_select(0, rows) for x in self.steps))
 
 
 def load_dataset(
@@ -88,7 +88,7 @@ def load_dataset(
         joined = np.concatenate([parts[name] for parts in kept])
         return torch.from_numpy(joined.astype(np.float32))
 
-    steps = Batch(
+    steps = StepBatch(
         observation=tensor("observation"),
         action=tensor("action").clamp(-1.0, 1.0),
         reward=tensor("reward") / scale,

@@ -15,7 +15,7 @@ from torch import Tensor
 from marl_airhockey.learn.networks import TwinLayers, linear_layers, move_toward
 from marl_airhockey.learn.offline.actor import Algorithm
 from marl_airhockey.learn.offline.config import OfflineConfig
-from marl_airhockey.learn.offline.dataset import Batch
+from marl_airhockey.learn.offline.dataset import StepBatch
 
 LARGEST_WEIGHT = 100.0
 """Largest weight of an action, as in the paper"""
@@ -31,7 +31,7 @@ class ImplicitQLearning(Algorithm):
         self.critics = TwinLayers([size + 2, *config.hidden, 1])
         self.targets = deepcopy(self.critics).requires_grad_(False)
 
-    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
+    def losses(self, step: int, batch: StepBatch) -> dict[str, Tensor]:
         observation, action, reward, after, _, not_done = batch
         both = torch.cat([observation, action], -1)
         with torch.no_grad():

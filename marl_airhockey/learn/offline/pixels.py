@@ -37,7 +37,7 @@ COLUMNS = ("state.position", "memory.goal", "action")
 """Columns that are read"""
 
 
-class Pictures(NamedTuple):
+class PixelSteps(NamedTuple):
     """Steps of one seat, with the pictures that it observed."""
 
     frames: Tensor
@@ -56,7 +56,7 @@ class Pictures(NamedTuple):
 
 def render_pictures(
     files: Sequence[Path], scene: Scene, seat: int, share: float
-) -> Pictures:
+) -> PixelSteps:
     """Render what a seat observed in recordings.
 
     Args:
@@ -99,7 +99,7 @@ def render_pictures(
             past = np.arange(count)[:, None] + np.arange(1 - FRAMES, 1)
             shown.append(first + np.maximum(past, 0))
             actions.append(episode.columns["action"][:, seat])
-    return Pictures(
+    return PixelSteps(
         torch.from_numpy(np.stack(frames)),
         torch.from_numpy(np.concatenate(shown)),
         torch.from_numpy(np.concatenate(actions).astype(np.float32)).clamp(-1, 1),

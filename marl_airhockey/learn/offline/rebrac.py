@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from marl_airhockey.learn.offline.dataset import Batch
+from marl_airhockey.learn.offline.dataset import StepBatch
 from marl_airhockey.learn.offline.td3_bc import TD3BC
 
 
@@ -18,11 +18,11 @@ class ReBRAC(TD3BC):
 
     NORMALIZED = True
 
-    def target_penalty(self, action: Tensor, batch: Batch) -> Tensor:
+    def target_penalty(self, action: Tensor, batch: StepBatch) -> Tensor:
         distance = (action - batch.next_action).square().sum(-1)
         return self.config.critic_penalty * distance
 
-    def actor_loss(self, batch: Batch) -> Tensor:
+    def actor_loss(self, batch: StepBatch) -> Tensor:
         value, error = self.value_and_error(batch)
         scale = 1.0 / value.abs().mean().detach()
         # The mean over both numbers of an action, as a sum.

@@ -16,7 +16,7 @@ from torch.func import functional_call
 from marl_airhockey.learn.networks import TwinLayers, move_toward
 from marl_airhockey.learn.offline.actor import Algorithm
 from marl_airhockey.learn.offline.config import OfflineConfig
-from marl_airhockey.learn.offline.dataset import Batch
+from marl_airhockey.learn.offline.dataset import StepBatch
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
 
 
@@ -35,7 +35,7 @@ class TD3BC(Algorithm):
         self.critic_targets = deepcopy(self.critics).requires_grad_(False)
         self.actor_target = deepcopy(self.actor).requires_grad_(False)
 
-    def losses(self, step: int, batch: Batch) -> dict[str, Tensor]:
+    def losses(self, step: int, batch: StepBatch) -> dict[str, Tensor]:
         target = self.critic_target(batch)
         values = self.critics(torch.cat([batch.observation, batch.action], -1))
         losses = {"critic": (values - target).square().mean(-1).sum()}
@@ -44,7 +44,7 @@ class TD3BC(Algorithm):
         return losses
 
     @torch.no_grad()
-    def critic_target(self, batch: Batch) -> Tensor:
+    def critic_target(self, batch: StepBatch) -> Tensor:
         """Return the values (n,) that the critics learn."""
         after, config = batch.next_observation, self.config
         action = torch.tanh(self.actor_target(after))
@@ -56,17 +56,17 @@ class TD3BC(Algorithm):
         found: Tensor = batch.reward + config.gamma * batch.not_done * value
         return found
 
-    def target_penalty(self, action: Tensor, batch: Batch) -> Tensor | float:
+    def target_penalty(self, action: Tensor, batch: StepBatch) -> Tensor | float:
         """Return what is subtracted (n,) from the value of a target action."""
         return 0.0
 
-    def actor_loss(self, batch: Batch) -> Tensor:
+    def actor_loss(self, batch: StepBatch) -> Tensor:
         """Return the loss of the actor."""
         value, error = self.value_and_error(batch)
         scale = self.config.alpha / value.abs().mean().detach()
         return error - scale * value.mean()
 
-    def value_and_error(self, batch: Batch) -> tuple[Tensor, Tensor]:
+    def value_and_error(self, batch: StepBatch) -> tuple[Tensor, Tensor]:
         """Return the values (n,) of the actor's actions and their mean square error."""
         action = torch.tanh(self.actor(batch.observation))
         # Constants here, so that only the actor learns from this.

@@ -32,7 +32,7 @@ FRAMES = 3
 """Number of pictures on top of each other in pixels."""
 
 
-class Column(NamedTuple):
+class Element(NamedTuple):
     """Element of an observation.
 
     ``(value - centre) / unit`` is of order one: the fixed scaling for a network.
@@ -84,25 +84,25 @@ class ObservationContext:
 
     def position_columns(
         self, name: str, unit: tuple[float, float], x: float = 0.0
-    ) -> list[Column]:
+    ) -> list[Element]:
         """Return the columns of a position, centred at (x, 0)."""
         ex, ey = self.extent
         return [
-            Column(f"{name}.x", -ex, ex, unit[0], x),
-            Column(f"{name}.y", -ey, ey, unit[1]),
+            Element(f"{name}.x", -ex, ex, unit[0], x),
+            Element(f"{name}.y", -ey, ey, unit[1]),
         ]
 
-    def offset_columns(self, name: str, unit: tuple[float, float]) -> list[Column]:
+    def offset_columns(self, name: str, unit: tuple[float, float]) -> list[Element]:
         """Return the columns of the offset from one position to another."""
         ex, ey = 2 * self.extent
         return [
-            Column(f"{name}.dx", -ex, ex, unit[0]),
-            Column(f"{name}.dy", -ey, ey, unit[1]),
+            Element(f"{name}.dx", -ex, ex, unit[0]),
+            Element(f"{name}.dy", -ey, ey, unit[1]),
         ]
 
-    def velocity_columns(self, name: str, most: float, unit: float) -> list[Column]:
+    def velocity_columns(self, name: str, most: float, unit: float) -> list[Element]:
         """Return the columns of a velocity."""
-        return [Column(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
+        return [Element(f"{name}.v{axis}", -most, most, unit) for axis in "xy"]
 
 
 class EgoView:
@@ -185,7 +185,7 @@ class Observable(ABC):
     """True for the wanted goal, which goals="dict" shows apart."""
 
     @abstractmethod
-    def columns(self, scope: ObservationContext) -> list[Column]:
+    def columns(self, scope: ObservationContext) -> list[Element]:
         """Return a column for each number."""
 
     @abstractmethod

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from marl_airhockey.cli.main import app
 from marl_airhockey.hardware.calibration.arm import along, chirp, find_lag, steps
-from marl_airhockey.hardware.calibration.motion import Motion, lead
+from marl_airhockey.hardware.calibration.motion import RecordedMotion, lead
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.hardware.robot import Robot
 from marl_airhockey.hardware.robot.config import ServoSettings
@@ -34,7 +34,7 @@ def answer(path, dead, half, seconds):
     rows = np.arange(0.0, seconds, 0.008)
     sent = np.stack([rows, np.interp(rows, times, aim), 0 * rows], 1)
     reported = np.interp(rows - dead, times, answered)
-    return Motion(np.stack([rows, reported, 0 * rows], 1), sent)
+    return RecordedMotion(np.stack([rows, reported, 0 * rows], 1), sent)
 
 
 @pytest.mark.parametrize(("path", "name"), [(steps, "steps"), (chirp, "chirp")])

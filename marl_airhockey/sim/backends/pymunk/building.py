@@ -16,7 +16,7 @@ NOTHING, EVERYTHING = pymunk.ShapeFilter(mask=0), pymunk.ShapeFilter()
 """Filters of the shapes that a shape can touch."""
 
 
-class Bodies:
+class SpaceBodies:
     """Bodies of a scene in a space, in the order of a `State`.
 
     Args:
@@ -68,7 +68,7 @@ class Bodies:
             self.friction_joints.append(joint)
 
 
-class Walls:
+class SpaceWalls:
     """Walls: boxes behind every side of the table, with a sensor in the gap of a goal.
 
     Args:

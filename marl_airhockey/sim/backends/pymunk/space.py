@@ -20,8 +20,8 @@ from marl_airhockey.sim.backends.pymunk.building import (
     PADDLE,
     PUCK,
     WALL,
-    Bodies,
-    Walls,
+    SpaceBodies,
+    SpaceWalls,
 )
 from marl_airhockey.sim.contracts.backend import PATIENCE
 from marl_airhockey.sim.core.laws import cap, fly, wall_restitution
@@ -63,7 +63,7 @@ class Space:
         self.crossed_velocity = np.zeros((bodies.pucks, lines, 2))
         self.lifted = np.zeros(bodies.pucks, np.bool_)
         self._pinned = np.zeros(bodies.pucks)
-        self.bodies, self._walls = Bodies(space, scene), Walls(space, scene)
+        self.bodies, self._walls = SpaceBodies(space, scene), SpaceWalls(space, scene)
         self._sides, self._elapsed = sides(scene), 0.0
         keeps = scene.table.puck_radius
         rows = [
