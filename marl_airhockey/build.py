@@ -12,7 +12,7 @@ from marl_airhockey.registry import (
     find_scenario,
     make_driver,
 )
-from marl_airhockey.sim.contracts.backend import Backend
+from marl_airhockey.sim.contracts.backend import Backend, LiveBackend
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
@@ -76,13 +76,11 @@ def build_world(
     num_worlds = check_count("num_worlds", num_worlds)
     game = scenario_of(scenario, keywords)
     profile, max_cycles = keywords.get("profile", "ideal"), keywords.get("max_cycles")
-    backend = _backend(game, num_worlds, keywords)
-    physics = _physics(game, backend, keywords, real=backend.senses_itself)
-    drivers = _drivers(game, backend, keywords)
-    if backend.senses_itself:
-        backend.expect(_physics(game, backend, keywords, real=False))
-    if backend.senses_itself or "rig" in keywords:
-        backend.connect(keywords.get("rig", ""))
+    kind = _backend_of(game, keywords)
+    live = issubclass(kind, LiveBackend)
+    physics = _physics(game, kind, keywords, real=live)
+    drivers = _drivers(game, live, keywords)
+    backend = _backend(kind, game, num_worlds, keywords)
     usual = "velocity" if profile == "ideal" else "history"
     own = [driver.observe for driver in drivers.values() if driver.observe]
     # Each once, in this order: the first is the form of the open seats.
@@ -138,30 +136,49 @@ def table_keywords(keywords: Keywords) -> Keywords:
     """
     backend = find_backend(keywords.get("backend", DEFAULT_BACKEND))
     rig = keywords.get("rig", "")
-    known = backend.table_and_profile(rig) if rig else None
-    if known is None:
+    if not (rig and issubclass(backend, LiveBackend)):
         return keywords
-    table, profile = known
+    table, profile = backend.table_and_profile(rig)
     options = {"table": table, **keywords.get("options", {})}
     given = keywords.get("profile", "ideal")
     used = profile if given == "ideal" else given
     return {**keywords, "profile": used, "options": options}
 
 
-def _backend(game: Scenario, num_worlds: int, keywords: Keywords) -> Backend:
-    """Return the backend that keywords name, for the scene of a scenario."""
+def _backend_of(game: Scenario, keywords: Keywords) -> type[Backend]:
+    """Return the class of the backend that keywords name, which supports a scenario."""
     name = keywords.get("backend", DEFAULT_BACKEND)
     kind = find_backend(name)
     reason = kind.supports(game.scene)
     if reason:
         raise ValueError(f"backend {name!r} cannot play {game.name!r}: {reason}")
+    return kind
+
+
+def _backend(
+    kind: type[Backend], game: Scenario, num_worlds: int, keywords: Keywords
+) -> Backend:
+    """Return a backend of a kind for the scene of a scenario."""
     control_dt, substeps = keywords.get("control_dt", 0.05), keywords.get("substeps")
     _check_times(control_dt, substeps)
-    return kind(game.scene, num_worlds, control_dt, substeps)
+    if not issubclass(kind, LiveBackend):
+        if "rig" in keywords:
+            raise ValueError(
+                'rig: this backend has no devices; leave it out, or take backend="real"'
+            )
+        return kind(game.scene, num_worlds, control_dt, substeps)
+    if num_worlds != 1:
+        raise ValueError(
+            f"num_worlds: {num_worlds}; expected 1, as there is one real table"
+        )
+    if substeps is not None:
+        raise ValueError("substeps: a real table has no physics steps; leave it out")
+    expected = _physics(game, kind, keywords, real=False)
+    return kind.open(game.scene, control_dt, keywords.get("rig", ""), expected)
 
 
 def _physics(
-    game: Scenario, backend: Backend, keywords: Keywords, real: bool
+    game: Scenario, backend: type[Backend], keywords: Keywords, real: bool
 ) -> Physics:
     """Return the ranges of physics that keywords name, see `Physics` for ``real``."""
     return Physics(
@@ -173,7 +190,7 @@ def _physics(
     )
 
 
-def _drivers(game: Scenario, backend: Backend, keywords: Keywords) -> dict[int, Driver]:
+def _drivers(game: Scenario, live: bool, keywords: Keywords) -> dict[int, Driver]:
     """Return the drivers that keywords name, by seat."""
     agents = [f"paddle_{i}" for i in range(len(game.scene.seats))]
     drivers: dict[int, Driver] = {}
@@ -181,17 +198,22 @@ def _drivers(game: Scenario, backend: Backend, keywords: Keywords) -> dict[int, 
         if agent not in agents:
             raise ValueError(unknown_name("agent", agent, agents))
         drivers[agents.index(agent)] = seated = make_driver(driver)
-        refuse_erratic(agent, seated, backend)
+        refuse_erratic(agent, seated, live)
     return drivers
 
 
-def refuse_erratic(agent: str, driver: Driver, backend: Backend) -> None:
-    """Do nothing if a driver may move what a backend moves.
+def refuse_erratic(agent: str, driver: Driver, live: bool) -> None:
+    """Refuse an erratic driver on a real table.
+
+    Args:
+        agent: Agent at the driver's seat.
+        driver: Driver.
+        live: Whether a real arm would follow it.
 
     Raises:
-        ValueError: It is erratic, and a real arm would follow it.
+        ValueError: It is erratic, and a real arm would.
     """
-    if backend.senses_itself and driver.erratic:
+    if live and driver.erratic:
         raise ValueError(f"{agent}: {driver!r} must not move a real arm")
 
 

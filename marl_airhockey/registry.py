@@ -16,7 +16,7 @@ from marl_airhockey.plugins import load_code, load_plugin, names_code, plugins
 from marl_airhockey.policies.callables import driver_of
 from marl_airhockey.policies.load import ZOO, load_policy
 from marl_airhockey.sim.backends.find import simulated_backend, simulated_names
-from marl_airhockey.sim.contracts.backend import Backend
+from marl_airhockey.sim.contracts.backend import Backend, LiveBackend
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import GoalScenario, Scenario
 from marl_airhockey.sim.core.errors import unknown_name
@@ -256,6 +256,11 @@ def find_backend(name: str) -> type[Backend]:
     if reason:
         raise RuntimeError(f"backend {name!r}: {reason}")
     return backend
+
+
+def is_live(backend: str) -> bool:
+    """Return True for the name of a backend of a real table."""
+    return issubclass(find_backend(backend), LiveBackend)
 
 
 def _build(

@@ -39,7 +39,6 @@ MOST_LINES = 300
 LONG = {
     "sim/backends/numba/busy.py": "the broad phase, whose bounds share one derivation",
     "sim/backends/pymunk/space.py": "one space with the callbacks of its collisions",
-    "hardware/table/backend.py": "the life of one table's devices, from start to stop",
     "sim/contracts/scenario.py": "a contract with the methods that all scenarios share",
     "toolkit/observables.py": "twelve observables of some 25 lines each",
     "sim/world/world.py": "one class, which all environments are views of",

@@ -12,7 +12,7 @@ from marl_airhockey.data.files import is_recording
 from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.hardware.camera import Film
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.registry import DEFAULT_BACKEND, is_live
 from marl_airhockey.rollout.columns import (
     episode_notes,
     first_columns,
@@ -62,7 +62,7 @@ def record_episodes(
             another recording or other files, or a film where there is no camera.
         OSError: A full disk.
     """
-    live = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
+    live = is_live(keywords.get("backend", DEFAULT_BACKEND))
     at_once = 1 if live else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
     head = _head(world, name, seed, keywords)

@@ -8,7 +8,7 @@ import numpy as np
 
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
+from marl_airhockey.registry import DEFAULT_BACKEND, is_live
 from marl_airhockey.rollout.replay import Replay
 from marl_airhockey.sim.core.recording import Columns, Recording
 from marl_airhockey.types import Array
@@ -28,7 +28,7 @@ def replay_differences(path: Path) -> dict[str, float]:
         ValueError: The recording cannot be replayed; named.
     """
     head, found = read_head(path), dict[str, float]()
-    if find_backend(head.get("backend", DEFAULT_BACKEND)).senses_itself:
+    if is_live(head.get("backend", DEFAULT_BACKEND)):
         raise ValueError(
             f"{path}: measured on a real table, where commands and observations do not "
             "follow from the states alone; leave out --replay"

@@ -17,7 +17,7 @@ from marl_airhockey.evaluation.comparison import Outcomes
 from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_driver
+from marl_airhockey.registry import DEFAULT_BACKEND, is_live, make_driver
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.columns import head_of
 from marl_airhockey.rollout.rollout import play_episodes
@@ -121,7 +121,7 @@ def evaluate(
     if scenario is None:
         raise ValueError("scenario: say what the driver is to play")
     # On a real table episodes follow each other; elsewhere many are played at once.
-    real = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
+    real = is_live(keywords.get("backend", DEFAULT_BACKEND))
     game, dt = scenario_of(scenario, keywords), keywords.get("control_dt", 0.05)
     cycles = keywords.get("max_cycles") or round(game.seconds / dt)
     at_once = 1 if real else min(episodes, max(MOST_STEPS // cycles, 1))

@@ -87,7 +87,7 @@ class RealMatch(LiveMatch):
         picture, s, of the newest pictures."""
         super().__init__(scenario, drivers, keywords, handicap, seed)
         own = make_operator(self.backend.rig.operator, self.ask)
-        self.backend.operator = CountingOperator(own, self)
+        self.backend.placing.operator = CountingOperator(own, self)
 
     @property
     def backend(self) -> RealBackend:

@@ -23,7 +23,7 @@ from marl_airhockey.rollout.columns import (
     scenario_of,
     states_of,
 )
-from marl_airhockey.sim.contracts.backend import Backend, Command
+from marl_airhockey.sim.contracts.backend import Backend, Command, LiveBackend
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.recording import Episode, Recording
@@ -209,7 +209,7 @@ def _physics(
     Of a real table nothing is simulated again: its states are measured.
     """
     profile, given = str(head.get("profile", "ideal")), head.get("physics")
-    arms, real = not played.tracks_commands, played.senses_itself
+    arms, real = not played.tracks_commands, issubclass(played, LiveBackend)
     like = Physics(game.scene.defaults, profile, given, arms=arms, real=real)  # type: ignore[arg-type]
     values = {
         name: np.array([episode.physics[name] for episode in episodes])

@@ -8,7 +8,7 @@ from typing import Unpack
 import numpy as np
 
 from marl_airhockey.build import build_driven_world, table_keywords
-from marl_airhockey.registry import DEFAULT_BACKEND, find_backend, make_driver
+from marl_airhockey.registry import DEFAULT_BACKEND, is_live, make_driver
 from marl_airhockey.rollout.as_trained import as_trained, seen_in
 from marl_airhockey.rollout.collector import Collector
 from marl_airhockey.rollout.columns import step_columns
@@ -58,7 +58,7 @@ def rollout(
     scenario, keywords = as_trained({"player": driver}, scenario, keywords)
     driver = seen_in(driver, keywords)
     # On a real table episodes follow each other; elsewhere many are played at once.
-    real = find_backend(keywords.get("backend", DEFAULT_BACKEND)).senses_itself
+    real = is_live(keywords.get("backend", DEFAULT_BACKEND))
     at_once = 1 if real else min(episodes, AT_ONCE)
     world = build_driven_world(driver, scenario, at_once, keywords)
     return _closing(world, episodes, seed, columns)

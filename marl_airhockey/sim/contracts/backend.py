@@ -73,11 +73,6 @@ class Backend(ABC):
     """True if paddles move exactly as commanded until something stops them. Where they
     do not, an arm moves them: it has parameters of its own, and no servo is simulated
     in addition."""
-    senses_itself: ClassVar[bool] = False
-    """True for a real table: its states are measured, so that no sensor, latency, noise
-    or servo is simulated; a step takes as long as it lasts; an episode begins with what
-    `arrange` brings about; limits continue from the last command, as measured
-    velocities come late."""
     timestep: ClassVar[float | None]
     """Longest physics step unless ``substeps`` is given, s; None without such steps."""
     viewpoints: ClassVar[tuple[str, ...]] = ()
@@ -141,54 +136,6 @@ class Backend(ABC):
         """
         self._before = state
 
-    @classmethod
-    def table_and_profile(cls, rig: str) -> tuple[str, str] | None:
-        """Return the names of a rig's table and of its robot's profile.
-
-        A simulation returns None.
-
-        Raises:
-            ValueError: The file cannot be read.
-        """
-        return None
-
-    def connect(self, rig: str) -> None:
-        """Connect to the devices of a real table, which a file describes.
-
-        Raises:
-            ValueError: This backend has none, or the file is wrong.
-            RuntimeError: A device does not answer, with the remedy.
-        """
-        raise ValueError(
-            'rig: this backend has no devices; leave it out, or take backend="real"'
-        )
-
-    def expect(self, physics: Physics) -> None:
-        """Set the ranges in which the physics of this table may lie."""
-        return None
-
-    def arrange(self, state: State) -> State:
-        """Arrange the state in which an episode begins; return the measured state.
-
-        Called after `reset` where `senses_itself` is true.
-
-        Raises:
-            RuntimeError: It cannot be arranged, with the reason.
-        """
-        return state
-
-    @property
-    def interruption(self) -> str:
-        """Reason why the running episode cannot continue; "" while it can."""
-        return ""
-
-    def sight(self) -> Array:
-        """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest frame.
-
-        Called where `senses_itself` is true.
-        """
-        raise NotImplementedError
-
     @abstractmethod
     def stage(self, command: Command, before: State, after: State) -> Stage:
         """Return a step of ``control_dt`` between preallocated states, for all worlds.
@@ -217,14 +164,6 @@ class Backend(ABC):
         bodies, visible = self.scene.bodies, self._rest.visible
         return State(bodies=bodies, visible=visible, path=path, **fields)
 
-    def telemetry(self) -> dict[str, Any]:
-        """Return what the devices of a real table report; JSON values.
-
-        The requested command, ``asked``, and the one that was ``sent``, m/s, are
-        among them. A simulation has none.
-        """
-        return {}
-
     def photograph(
         self, world: int, viewpoint: str, marks: Sequence[Mark], width: int
     ) -> Array:
@@ -238,3 +177,66 @@ class Backend(ABC):
     def close(self) -> None:
         """Free the resources of the backend."""
         return None
+
+
+class LiveBackend(Backend):
+    """Backend of a real table: its states are measured.
+
+    So no sensor, latency, noise or servo is simulated; a step takes as long as it
+    lasts; an episode begins with what `arrange` brings about; limits continue from the
+    last command, as measured velocities come late. There is one world.
+    """
+
+    @classmethod
+    @abstractmethod
+    def table_and_profile(cls, rig: str) -> tuple[str, str]:
+        """Return the names of a rig's table and of its robot's profile.
+
+        Raises:
+            ValueError: The file cannot be read.
+        """
+
+    @classmethod
+    @abstractmethod
+    def open(
+        cls, scene: Scene, control_dt: float, rig: str, physics: Physics
+    ) -> LiveBackend:
+        """Open the devices of a table and return its backend.
+
+        Args:
+            scene: Scene on the table.
+            control_dt: Time of a step, s.
+            rig: Path of the file that describes the devices.
+            physics: Ranges in which the physics of the table may lie.
+
+        Raises:
+            ValueError: The file is wrong, or of another table.
+            RuntimeError: A device does not answer, with the remedy.
+        """
+
+    @abstractmethod
+    def arrange(self, state: State) -> State:
+        """Arrange the state in which an episode begins; return the measured state.
+
+        Called after `reset`.
+
+        Raises:
+            RuntimeError: It cannot be arranged, with the reason.
+        """
+
+    @property
+    @abstractmethod
+    def interruption(self) -> str:
+        """Reason why the running episode cannot continue; "" while it can."""
+
+    @abstractmethod
+    def sight(self) -> Array:
+        """Return (B, pucks, 4) x, y, m, visibility and age, s, in the newest frame."""
+
+    @abstractmethod
+    def telemetry(self) -> dict[str, Any]:
+        """Return what the devices report; JSON values.
+
+        The requested command, ``asked``, and the one that was ``sent``, m/s, are
+        among them.
+        """

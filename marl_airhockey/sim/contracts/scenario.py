@@ -8,21 +8,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 
 from marl_airhockey.sim.contracts.mark import Mark, Meaning
 from marl_airhockey.sim.contracts.observable import Observable
-from marl_airhockey.sim.contracts.units import Latency, Seconds, Weight, check_number
-from marl_airhockey.sim.core.errors import unknown_name
+from marl_airhockey.sim.contracts.options import check_places, checked_options
+from marl_airhockey.sim.contracts.units import Latency, Seconds, Weight
 from marl_airhockey.sim.core.geometry import length
-from marl_airhockey.sim.core.parameters import PARAMETERS
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import Scene
-from marl_airhockey.sim.core.seat import SEAT_KINDS, Seat, make_seat
+from marl_airhockey.sim.core.seat import Seat, make_seat
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.core.table import TABLES, Obstacle, Table
 from marl_airhockey.sim.core.touches import count_touches, no_touches
@@ -87,32 +86,13 @@ class Scenario(ABC):
     """Raised whenever the numbers of the scenario change: the v of its gymnasium id."""
 
     def __post_init__(self) -> None:
-        if self.seats not in SEAT_KINDS:
-            raise ValueError(unknown_name("kind of seats", self.seats, SEAT_KINDS))
-        if self.table not in TABLES:
-            raise ValueError(unknown_name("table", self.table, TABLES))
-        if self.goals not in ("flat", "dict"):
-            raise ValueError(
-                unknown_name("form of goals", self.goals, ("flat", "dict"))
-            )
-        for name, sizes in ELEMENTS.items():
-            found = _elements(name, getattr(self, name), sizes)
-            object.__setattr__(self, name, found)
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, np.generic):
-                object.__setattr__(self, f.name, value := value.item())
-            check_number(f.name, f.type, value)
-        if self.seconds == 0:
-            raise ValueError("seconds: must be above 0")
-        for name in ELEMENTS:
-            _check_places(name, getattr(self, name), self.scene.table)
+        for name, value in checked_options(self).items():
+            object.__setattr__(self, name, value)
+        check_places(self, self.scene.table)
         if self.obstacles and not self.scene.obstacles:
             raise ValueError("obstacles: this scenario's own table takes none")
         if self.goals == "dict" and not isinstance(self, GoalScenario):
             raise ValueError('goals="dict": this scenario has no desired goal')
-        if self.rules not in ("own", "paper"):
-            raise ValueError(unknown_name("rules", self.rules, ("own", "paper")))
         if self.rules == "paper":
             if type(self).paper_success is Scenario.paper_success:
                 raise ValueError('rules="paper": not one of the ten tasks of the paper')
@@ -230,8 +210,7 @@ class Scenario(ABC):
         """Return by what one world's game is decided; "" if by nothing."""
         return ""
 
-    # Final methods: do not override.
-
+    @final
     @property
     def name(self) -> str:
         """Name of the file that the scenario comes from."""
@@ -242,6 +221,7 @@ class Scenario(ABC):
         """Table of the option ``table``, with the obstacles."""
         return self.furnished(TABLES[self.table])
 
+    @final
     def furnished(self, table: Table) -> Table:
         """Return a table with the obstacles on it."""
         posts = [
@@ -250,10 +230,12 @@ class Scenario(ABC):
         ]
         return replace(table, obstacles=tuple(posts))
 
+    @final
     def seat(self, side: int = 0, others: tuple[int, ...] = (), team: int = 0) -> Seat:
         """Return a seat of the chosen kind at a side of the table."""
         return make_seat(self.seats, self.table_geometry, side, others, team)
 
+    @final
     def next_memory(self, t: Transition) -> Memory:
         """Return the memory after a step: touches, then what the scenario counts."""
         new = dict(t.memory)
@@ -262,6 +244,7 @@ class Scenario(ABC):
         new.update(self.update_memory(t._replace(new_memory=new)))
         return new
 
+    @final
     def all_reward_terms(self, t: Transition) -> dict[str, Array]:
         """Return all reward terms, with the regularizing ones, (..., seats) each.
 
@@ -288,10 +271,12 @@ class Scenario(ABC):
             terms["regions"] = paid * (t.after.time - t.before.time)[..., None]
         return terms
 
+    @final
     def added_drag(self, state: State) -> Array:
         """(..., pucks) linear drag that regions add, 1/s."""
         return _sums(state.puck, self.drag_regions)
 
+    @final
     def all_marks(self, state: State, memory: Memory) -> list[Mark]:
         """Return what to draw for one world: `marks`, and the regions."""
         paid = self.reward_regions
@@ -301,6 +286,7 @@ class Scenario(ABC):
         circles = [Mark.circle(np.array(r[:2]), r[2], kind) for r, kind in regions]
         return [*circles, *self.marks(state, memory)]
 
+    @final
     def is_terminated(self, t: Transition) -> Array:
         """(...) bool: `terminated`; with goals="dict", the goal is met.
 
@@ -318,6 +304,7 @@ class Scenario(ABC):
             ends = ends | t.after.lifted.any(-1)
         return ends
 
+    @final
     def is_success(self, t: Transition) -> Array:
         """(...) or (..., seats) bool: `success`; with goals="dict" the goal is met."""
         if self.goals == "dict":
@@ -328,6 +315,7 @@ class Scenario(ABC):
         """(...) bool: the desired goal is met at a state, by `goal_reward` alone."""
         raise NotImplementedError(f"{type(self).__name__} has no desired goal")
 
+    @final
     def replay_memory(self, memory: Memory, states: State, command: Array) -> Memory:
         """Apply `next_memory` along a recording, as if no time limit were reached.
 
@@ -346,53 +334,6 @@ class Scenario(ABC):
             step = Transition(before, command[k], after, old, old, last)
             memories.append(self.next_memory(step))
         return {name: np.stack([m[name] for m in memories]) for name in memory}
-
-
-ELEMENTS = {"obstacles": (3, 5), "reward_regions": (4,), "drag_regions": (4,)}
-"""Options that are lists of elements of the scene, and how many numbers an element
-has."""
-
-
-def _elements(name: str, value: Any, sizes: tuple[int, ...]) -> tuple[Any, ...]:
-    """Return the elements of an option as tuples; refuse others than lists of them."""
-    try:
-        found = tuple(tuple(float(x) for x in element) for element in value)
-    except (TypeError, ValueError):
-        found = ((),)
-    for k, element in enumerate(found):
-        if len(element) not in sizes or not np.isfinite(element).all():
-            words = " or ".join(map(str, sizes))
-            raise ValueError(f"{name}: {value!r} must be lists of {words} numbers")
-        if element[2] <= 0:
-            raise ValueError(f"{name}: element {k}, {element}: radius must be above 0")
-        most = PARAMETERS["puck_damping"].high
-        if name == "drag_regions" and not 0 <= element[3] <= most:
-            raise ValueError(
-                f"{name}: element {k}, {element}: drag must be in 0 .. {most:g} 1/s"
-            )
-    return found
-
-
-def _check_places(
-    name: str, elements: tuple[tuple[float, ...], ...], table: Table
-) -> None:
-    """Refuse elements that are not on the table.
-
-    Raises:
-        ValueError: One of them, named.
-    """
-    half = np.abs(table.vertices).max(0)
-    for k, element in enumerate(elements):
-        x, y, radius = element[:3]
-        ends = np.array([[x, y], element[3:5] if len(element) == 5 else [x, y]])
-        # A bar may lie across the table with both ends outside.
-        nearest = np.maximum(ends.min(0), np.minimum(ends.max(0), 0.0))
-        if (np.abs(nearest) - radius > half).any() or radius > 2 * half.max():
-            raise ValueError(
-                f"{name}: element {k}, {element}, is not on the table, which reaches "
-                f"from -{half[0]:g} to {half[0]:g} m and from -{half[1]:g} to "
-                f"{half[1]:g} m"
-            )
 
 
 def _sums(points: Array, regions: tuple[tuple[float, ...], ...]) -> Array:

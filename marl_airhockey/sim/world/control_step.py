@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from marl_airhockey.sim.contracts.backend import Backend, Command
+from marl_airhockey.sim.contracts.backend import Backend, Command, LiveBackend
 from marl_airhockey.sim.core.limits import INFINITE, Limited, limits_stage
 from marl_airhockey.sim.core.rows import clear_rows
 from marl_airhockey.sim.core.seat import ReachPlanes
@@ -150,7 +150,7 @@ class ControlStep:
         shared = reach, (top, physics["paddle_acceleration"]), self._backend.control_dt
         # Measured velocities come late: there the last command is taken instead.
         last = state.velocity
-        if self._backend.senses_itself:
+        if isinstance(self._backend, LiveBackend):
             last = before.realized.velocity
         moved = state.position, last, before.realized.acceleration
         if not self._lags:

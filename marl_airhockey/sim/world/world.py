@@ -19,7 +19,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from marl_airhockey.sim.contracts.backend import Backend
+from marl_airhockey.sim.contracts.backend import Backend, LiveBackend
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count
@@ -83,7 +83,7 @@ class World(WorldSpaces):
         self._limit = np.full(b, check_count("max_cycles", cycles))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = ReachPlanes.of(scene.table, scene.seats)
-        sight = backend.sight if backend.senses_itself else None
+        sight = backend.sight if isinstance(backend, LiveBackend) else None
         self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), sight)
         self.observer = Observer(scenario, self.sensor, physics, forms)
         self.driven = [
@@ -104,7 +104,7 @@ class World(WorldSpaces):
         self._sensed = self._best = self._judged = self._state
         self._follower = None if self.sensor.ideal else SensedMemory(scenario)
         self._step: ControlStep | None = None
-        check_elements(scenario, backend.senses_itself)
+        check_elements(scenario, sight is not None)
         self._drag = DragRegions(scenario, b) if scenario.drag_regions else None
         self.start_spread = 1.0
         """Share of the ranges, about their middles, from which episodes start"""
@@ -272,7 +272,7 @@ class World(WorldSpaces):
     def reset_worlds(self, worlds: Array) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
         rng = self.draw_worlds(worlds)
-        if self.backend.senses_itself:
+        if isinstance(self.backend, LiveBackend):
             # All is compiled now, so that no time is lost once the puck moves.
             state = self.backend.arrange(self._state)
             memory = self.scenario.initial_memory(state, rng)
@@ -437,7 +437,7 @@ class World(WorldSpaces):
         moment = step()
         self._adopt(moment)
         result = StepResult.of(moment, self.open if self.driven else None)
-        if self.backend.senses_itself and self.backend.interruption:
+        if isinstance(self.backend, LiveBackend) and self.backend.interruption:
             result.interruption = self.backend.interruption
             result.truncated[:] = True
         self._observe(moment, result)

@@ -210,7 +210,7 @@ def test_sensing_costs_nothing_in_the_ideal_profile():
     np.testing.assert_array_equal(world.sensed.velocity, world.state.velocity)
 
 
-def test_a_backend_that_senses_itself_gets_no_simulated_camera():
+def test_a_live_backend_gets_no_simulated_camera():
     world = ah.make_world("juggle", 1, profile="ur5e")
     world.reset(0)
     measured = np.array([[[0.1, 0.2, 1.0, 0.03]]])

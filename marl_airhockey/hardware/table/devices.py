@@ -1,0 +1,90 @@
+"""Devices of a real table: its camera, what finds the puck, and its robot."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+
+import numpy as np
+
+from marl_airhockey.hardware.camera import Camera, open_source
+from marl_airhockey.hardware.rig import Rig
+from marl_airhockey.hardware.robot import Robot
+from marl_airhockey.hardware.table.overlay import Overlay
+from marl_airhockey.hardware.vision import Detector
+from marl_airhockey.hardware.vision.calibration import view_trouble
+from marl_airhockey.hardware.vision.rectifier import Rectifier
+from marl_airhockey.hardware.vision.watcher import Watcher
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.table import TABLES
+
+FIRST_FRAME = 10.0
+"""Longest time from opening a camera to its first frame, s"""
+
+
+class TableDevices:
+    """Devices of a table, which are open until `close`.
+
+    Args:
+        scene: Scene that is played on the table.
+        rig: Description of the devices.
+
+    Raises:
+        ValueError: The scene is of another table.
+        RuntimeError: A device does not answer, or the camera does not show the table
+            with one puck; with the remedy.
+    """
+
+    def __init__(self, scene: Scene, rig: Rig) -> None:
+        table = TABLES[rig.table]
+        if scene.table != table:
+            raise ValueError(
+                f"the scenario's table is not the rig's {rig.table!r}; pass "
+                f'options={{"table": "{rig.table}"}} or --option table={rig.table}'
+            )
+        self.rig = rig
+        config = rig.robot_config(scene.seats[0].reach)
+        half = tuple(float(x) for x in table.size / 2)
+        detector = Detector(
+            *(rig.view, rig.puck, table.puck_radius, half),  # type: ignore[arg-type]
+            readout=rig.readout,
+        )
+        self.overlay = Overlay(rig.view, table)
+        self.rectifier = Rectifier(rig.view, table.size)
+        with ExitStack() as stack:
+            self.camera = stack.enter_context(
+                Camera(open_source(rig.camera, rig.latency))
+            )
+            self._check_camera()
+            if scene.pucks:
+                self._check_pucks(detector)
+            self.watcher = Watcher(self.camera, detector)
+            stack.callback(self.watcher.close)
+            self.robot = stack.enter_context(Robot(config))
+            self._open = stack.pop_all()
+
+    def _check_camera(self) -> None:
+        frame = self.camera.next(seconds=FIRST_FRAME)
+        if frame is None:
+            raise RuntimeError(
+                f"{self.camera.trouble}; check that {self.rig.camera} is the camera"
+            )
+        trouble = view_trouble(self.rig.view, [frame.image], self.rig.known_tags)
+        if trouble:
+            raise RuntimeError(f"camera {self.rig.camera}: {trouble}")
+
+    def _check_pucks(self, detector: Detector) -> None:
+        """Refuse a table on which several objects have the puck's colour."""
+        frame = self.camera.newest
+        assert frame is not None
+        found = [np.round(seen.place, 2).tolist() for seen in detector.find_all(frame)]
+        if len(found) > 1:
+            raise RuntimeError(
+                f"camera: {len(found)} things have the puck's colour and size, at "
+                f"{found} m; leave one puck on the table, or calibrate another colour"
+            )
+
+    def close(self) -> None:
+        """Stop the robot and close all devices."""
+        if self.robot.is_connected:
+            self.robot.disable()
+        self._open.close()

@@ -1,0 +1,126 @@
+"""Placing: what happens on a real table between two episodes."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from marl_airhockey.hardware.robot import DriverState, Fault
+from marl_airhockey.hardware.table.devices import TableDevices
+from marl_airhockey.hardware.table.operator import make_operator
+from marl_airhockey.hardware.vision import Sighting
+from marl_airhockey.sim.core.scene import Scene
+from marl_airhockey.sim.core.state import State
+from marl_airhockey.types import Array
+
+FIRST = 3
+"""Number of sightings from which the first estimate is made"""
+SEEN_AGAIN = 2.0
+"""Longest time from a puck's release until it has been seen so often, s"""
+PLACING = 30.0
+"""Longest time until a placed puck is seen, s"""
+APART = 0.08
+"""Largest accepted distance of a placed puck from its target position, m"""
+
+
+class Placing:
+    """Placing of paddle and puck, by the robot and an operator.
+
+    Args:
+        devices: Devices of the table.
+        scene: Scene on it.
+    """
+
+    def __init__(self, devices: TableDevices, scene: Scene) -> None:
+        self._devices, self._scene = devices, scene
+        self.operator = make_operator(devices.rig.operator)
+        """Operator, who places the puck and allows the arm to move"""
+        self._allowed = False
+
+    def place(self, state: State) -> list[Sighting]:
+        """Bring about the state in which an episode begins; the robot is ready then.
+
+        Args:
+            state: State (1, ...).
+
+        Returns:
+            First sightings of the puck after its release; none without a puck.
+
+        Raises:
+            RobotError: The robot does not recover, or does not get there.
+            RuntimeError: The puck is not seen, or not where it belongs.
+        """
+        robot = self._devices.robot
+        if not self._allowed:
+            reach = self._scene.seats[0].reach
+            self.operator.begin(self._devices.rig.motion_words(reach))
+            self._allowed = True
+        self._ready_robot()
+        robot.go_to(state.paddle[0, 0])
+        if not self._scene.pucks:
+            return []
+        target, velocity = state.puck[0, 0], state.puck_velocity[0, 0]
+        self.operator.place(target, velocity)
+        self._await_puck(target)
+        self.operator.release()
+        return self._first_sightings()
+
+    def _ready_robot(self) -> None:
+        """Recover a robot that has stopped, after the operator has allowed it.
+
+        Raises:
+            RobotError: The robot does not recover.
+        """
+        robot = self._devices.robot
+        while robot.state is DriverState.FAULT or not robot.is_connected:
+            self.operator.allow(robot.fault.label)
+            if robot.fault is Fault.EMERGENCY_STOP:
+                # A person must release it at the pendant, or `connect` fails.
+                robot.disconnect()
+                robot.connect()
+            else:
+                robot.recover()
+
+    def _await_puck(self, target: Array) -> None:
+        """Wait until the placed puck is seen near its target position (2,), m.
+
+        Raises:
+            RuntimeError: The puck is not seen there in time.
+        """
+        devices, far = self._devices, float("inf")
+        began = time.monotonic()
+        until = began + PLACING
+        while time.monotonic() < until:
+            devices.robot.send_action(np.zeros(2), 0.0)
+            last = devices.watcher.last
+            if last is not None and last.taken > began:
+                far = float(np.linalg.norm(last.place - target))
+                if far < APART:
+                    return
+            time.sleep(0.02)
+        trouble = devices.camera.trouble or devices.watcher.trouble
+        where = "not seen" if not np.isfinite(far) else f"seen {far:.2f} m from there"
+        raise RuntimeError(
+            f"the puck is {where} within {PLACING:.0f} s (target "
+            f"{np.round(target, 2)} m); "
+            f"{trouble or 'put it at its target'}"
+        )
+
+    def _first_sightings(self) -> list[Sighting]:
+        """Return the first sightings of a puck that was just released.
+
+        Raises:
+            RuntimeError: The puck is not seen often enough.
+        """
+        devices = self._devices
+        devices.watcher.take()
+        seen: list[Sighting] = []
+        until = time.monotonic() + SEEN_AGAIN
+        while len(seen) < FIRST and time.monotonic() < until:
+            devices.robot.send_action(np.zeros(2), 0.0)
+            time.sleep(0.005)
+            seen += devices.watcher.take()
+        if len(seen) < FIRST:
+            raise RuntimeError("the puck was not seen after its release")
+        return seen
