@@ -37,7 +37,7 @@ EXTRAS = [
 ]
 MOST_LINES = 300
 LONG = {
-    "sim/backends/numba/busy.py": "the broad phase, whose bounds share one derivation",
+    "sim/backends/numba/event_loop.py": "one loop, whose phases numba inlines",
     "sim/backends/pymunk/space.py": "one space with the callbacks of its collisions",
     "sim/contracts/scenario.py": "a contract with the methods that all scenarios share",
     "toolkit/observables.py": "twelve observables of some 25 lines each",

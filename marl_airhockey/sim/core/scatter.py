@@ -37,25 +37,29 @@ def draw(key: np.uint64, number: int, place: int) -> tuple[float, float, float]:
 
 @compiled(nogil=True, error_model="numpy")
 def at_wall(
-    luck: tuple[float, float, float], speed: float, e: float, sd: float, exit_sd: float
+    sample: tuple[float, float, float],
+    speed: float,
+    e: float,
+    sd: float,
+    exit_sd: float,
 ) -> tuple[float, float]:
     """Return restitution and speed along the wall, m/s, that a bounce adds.
 
     Args:
-        luck: what `draw` returned.
+        sample: what `draw` returned.
         speed: closing speed, m/s; slower bounces than were measured scatter less.
         e: restitution by the law.
         sd: of the restitution.
         exit_sd: of the speed along the wall, m/s.
     """
-    wide = WIDER if luck[2] < TAIL else 1.0
+    wide = WIDER if sample[2] < TAIL else 1.0
     share = min(speed / SLOWEST_BOUNCE, 1.0)
-    return min(max(e + sd * luck[0], 0.0), 1.0), wide * exit_sd * luck[1] * share
+    return min(max(e + sd * sample[0], 0.0), 1.0), wide * exit_sd * sample[1] * share
 
 
 @compiled(nogil=True, error_model="numpy")
 def at_paddle(
-    luck: tuple[float, float, float], e: float, sd: float, spin_sd: float
+    sample: tuple[float, float, float], e: float, sd: float, spin_sd: float
 ) -> tuple[float, float]:
     """Return restitution, and speed of the edge per speed of the puck after the hit."""
-    return min(max(e + sd * luck[0], 0.0), 1.0), spin_sd * luck[1]
+    return min(max(e + sd * sample[0], 0.0), 1.0), spin_sd * sample[1]

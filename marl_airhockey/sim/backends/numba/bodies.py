@@ -17,7 +17,7 @@ DX, DY, CX, CY, EX, EY, GX, GY, REACH, BEND = range(9, 19)
 EARLY_X, EARLY_Y, LATE_X, LATE_Y, FALL, INSIDE, HELD = range(19, 26)
 BODY = 26
 """Columns of a body: position, velocity, spin, angle and radius; inverse mass, and
-that of a spinning disc's edge (radius squared over its inertia); in the coming drift
+that of a spinning disc's edge (radius squared over its inertia); in the coming move
 its mean velocity with contacts and without, and its velocity at the end; for paddles
 the velocity at the end of the step; highest speed (m/s) and acceleration (m/s2) in what
 is left of the step; two points that its way lies between, from where it is, and how far

@@ -49,38 +49,38 @@ def block_space(movers: int) -> Array:
 
 
 @inner(error_model="numpy")
-def fly_freely(batch: Batch, busy: Array, work: Array) -> bool:
-    """Move the worlds in which nothing can meet, and mark the others as busy.
+def fly_freely(batch: Batch, active: Array, work: Array) -> bool:
+    """Move the worlds in which nothing can meet, and mark the others as active.
 
-    The events of all worlds are cleared and their clocks advanced. The bodies of a busy
-    world end where nothing would have met.
+    The events of all worlds are cleared and their clocks advanced. The bodies of an
+    active world end where nothing would have met.
 
     Args:
         batch: all arrays.
-        busy: (B,) bool, filled.
+        active: (B,) bool, filled.
         work: `block_space`.
 
     Returns:
-        True if any world is busy.
+        True if any world is active.
     """
     _clear_events(batch)
     if batch.result.path.shape[1] > 0:
-        busy[:] = True
+        active[:] = True
         return True
     paddles, pucks, blocks = batch.static[:3]
     movers, some = paddles + pucks + blocks, False
     # Lengths that the compiler knows tell it that rows do not overlap.
     m = view(work.ctypes.data, (movers + 1, ROWS, WORLDS), np.float64)
-    for start in range(0, len(busy), WORLDS):
-        count = min(WORLDS, len(busy) - start)
+    for start in range(0, len(active), WORLDS):
+        count = min(WORLDS, len(active) - start)
         _gather(batch, start, count, m)
         _find_room_at_sides(batch, count, m)
         _find_room_in_reach(batch, count, m)
         _find_room_between(batch, count, m)
         for c in range(count):
-            busy[start + c] = not m[movers, ROOM, c] >= 0.0
-            some |= busy[start + c]
-        _move(batch, start, count, m, busy)
+            active[start + c] = not m[movers, ROOM, c] >= 0.0
+            some |= active[start + c]
+        _move(batch, start, count, m, active)
     return some
 
 
@@ -148,7 +148,7 @@ def _gather(batch: Batch, start: int, count: int, m: Array) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _find_room_at_sides(batch: Batch, count: int, m: Array) -> None:
-    """Find the room between pucks and what is fixed; see `list_near`."""
+    """Find the room between pucks and what is fixed; see `list_pairs`."""
     static = batch.static
     paddles, pucks, blocks, radius, walls = static[:5]
     obstacles, fixed = static.obstacles, len(walls) + len(static.obstacles)
@@ -195,7 +195,7 @@ def _find_room_in_reach(batch: Batch, count: int, m: Array) -> None:
 
 @inner(error_model="numpy", forceinline=True)
 def _find_room_between(batch: Batch, count: int, m: Array) -> None:
-    """Find the room between bodies; see `list_near`."""
+    """Find the room between bodies; see `list_pairs`."""
     paddles, pucks, blocks, radius = batch.static[:4]
     last = paddles + pucks + blocks
     for i in range(paddles + pucks):
@@ -215,7 +215,7 @@ def _find_room_between(batch: Batch, count: int, m: Array) -> None:
 
 
 @inner(error_model="numpy", forceinline=True)
-def _move(batch: Batch, start: int, count: int, m: Array, busy: Array) -> None:
+def _move(batch: Batch, start: int, count: int, m: Array, active: Array) -> None:
     """Move bodies: paddles on ramps, pucks in free flight."""
     static, coefficients, _, previous, result = batch[:5]
     paddles, pucks, blocks, dt = *static[:3], static.control_dt
@@ -254,7 +254,7 @@ def _move(batch: Batch, start: int, count: int, m: Array, busy: Array) -> None:
                 result.velocity[b, i, axis] = previous.velocity[b, i, axis]
     for k in range(pucks):
         for b in range(start, start + count):
-            result.pinned[b, k] = result.pinned[b, k] if busy[b] else 0.0
+            result.pinned[b, k] = result.pinned[b, k] if active[b] else 0.0
         for s in range(result.against.shape[2]):
             for b in range(start, start + count):
-                result.against[b, k, s] &= busy[b]
+                result.against[b, k, s] &= active[b]

@@ -31,8 +31,8 @@ from marl_airhockey.sim.backends.numba.bodies import (
     closing,
     shares,
 )
+from marl_airhockey.sim.backends.numba.contact_solver import ALL, PADDLES, push
 from marl_airhockey.sim.backends.numba.impulses import hardest, impact, strike
-from marl_airhockey.sim.backends.numba.pushes import ALL, PADDLES, push
 from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
@@ -152,9 +152,9 @@ def _bounce(
 
 @inner(error_model="numpy")
 def _rest(m: Array, role: Array, pairs: Array, contacts: Array, n: int) -> bool:
-    """Let nothing close in the coming drift; return True if that was found.
+    """Let nothing close in the coming move; return True if that was found.
 
-    A contact that has pushed does not part within the drift, so that it does no work:
+    A contact that has pushed does not part within the move, so that it does no work:
     what a later push took from it, it takes back.
     """
     pushed = np.zeros(n)

@@ -1,7 +1,7 @@
 """Kernel of the 2D table: one control step of B worlds in one compiled loop.
 
 A world in which nothing can meet moves in one piece (`flight`), any other one from
-contact to contact (`busy`).
+contact to contact (`event_loop`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from marl_airhockey.sim.backends.numba.arrays import (
     Static,
 )
 from marl_airhockey.sim.backends.numba.bodies import BODY, CONTACT
-from marl_airhockey.sim.backends.numba.busy import advance_busy
+from marl_airhockey.sim.backends.numba.event_loop import run_events
 from marl_airhockey.sim.backends.numba.flight import block_space, fly_freely
 from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
@@ -105,10 +105,10 @@ def advance(
         *(banked, crossed, crossed_velocity, lifted, path, against, out, pinned),
     )
     batch = Batch(static, coefficients, commands, previous, result, keys, collisions)
-    busy = np.empty(len(coefficients), np.bool_)
+    active = np.empty(len(coefficients), np.bool_)
     blocked = block_space(paddles + pucks + blocks)
-    if fly_freely(batch, busy, blocked):
-        advance_busy(batch, busy, work, indices)
+    if fly_freely(batch, active, blocked):
+        run_events(batch, active, work, indices)
     for b in range(len(goal)):
         for i in range(paddles):
             if imposed[b, i]:

@@ -17,7 +17,7 @@ from marl_airhockey.sim.backends.numba.bodies import (
     VY,
 )
 from marl_airhockey.sim.backends.numba.complementarity import complement
-from marl_airhockey.sim.backends.numba.pushes import ALL, PADDLES, push
+from marl_airhockey.sim.backends.numba.contact_solver import ALL, PADDLES, push
 from marl_airhockey.sim.jit.cache import compiled
 
 complement, push = map(compiled(error_model="numpy"), (complement, push))

@@ -1,4 +1,4 @@
-"""Pushes: impulses without restitution at all contacts of a moment, solved together.
+"""Contact solver: impulses without restitution at all contacts of a moment, together.
 
 They are the least that let nothing in contact close (Gauss' principle): a contact that
 pushes neither closes nor parts, one that does not push may part.

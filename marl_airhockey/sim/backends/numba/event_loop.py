@@ -1,6 +1,17 @@
-"""Busy worlds: those in which something may meet move from contact to contact.
+"""Event loop: worlds in which something may meet move from contact to contact.
 
-`drift` finds the first touch on the way, `impacts` what comes of it.
+For each such world, until its control step is over:
+
+1. pairs that can meet in the time left, where these have changed (`broad_phase`)
+2. distance and closing speed of each pair; events of contacts that begin and end
+3. bodies that overlap: move them apart, and begin again at 1 (`overlaps`)
+4. bodies that close: impulses of all contacts (`impacts`), and begin again at 1
+5. time that is safe: bounded by distances, by the curves of paths, by the path's rows
+6. move all bodies by it, or up to the first contact on the way (`time_of_impact`),
+   with contacts that press held by the least impulses (`contact_solver`)
+7. pucks that have crossed a goal line leave the game
+
+What is left over after 60 rounds moves in at most 50 parts, so that the loop ends.
 """
 
 from __future__ import annotations
@@ -58,7 +69,7 @@ from marl_airhockey.sim.backends.numba.bodies import (
     distance_between,
     slop,
 )
-from marl_airhockey.sim.backends.numba.drift import drift
+from marl_airhockey.sim.backends.numba.broad_phase import list_pairs, longest_move
 from marl_airhockey.sim.backends.numba.geometry import (
     NEAR,
     RELEASE,
@@ -67,8 +78,8 @@ from marl_airhockey.sim.backends.numba.geometry import (
     stays_in_reach,
 )
 from marl_airhockey.sim.backends.numba.impacts import solve
-from marl_airhockey.sim.backends.numba.near import list_near, longest_drift
 from marl_airhockey.sim.backends.numba.overlaps import keep_in_reach, take_apart
+from marl_airhockey.sim.backends.numba.time_of_impact import move_to_impact
 from marl_airhockey.sim.contracts.backend import PATIENCE
 from marl_airhockey.sim.core.laws import cap, wall_restitution
 from marl_airhockey.sim.core.scatter import at_paddle, at_wall, draw
@@ -81,7 +92,7 @@ JAMMED = 3.0
 
 
 @inner(error_model="numpy")
-def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None:
+def run_events(batch: Batch, active: Array, work: Array, indices: Array) -> None:
     """Move the worlds in which something may meet, from contact to contact.
 
     Each inner function is one phase; numba inlines them, which saves the reference
@@ -238,9 +249,9 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
         if 0 <= i < paddles and role[j] == PUCK:
             restitution, friction = row[PADDLE_E], row[PADDLE_MU]
             if row[PADDLE_E_SD] > 0.0 or row[SPIN_SD] > 0.0:
-                luck = draw(keys[b], collisions[b], movers * (i + 1) + j)
+                sample = draw(keys[b], collisions[b], movers * (i + 1) + j)
                 sds = row[PADDLE_E_SD], row[SPIN_SD]
-                restitution, kick = at_paddle(luck, restitution, *sds)
+                restitution, kick = at_paddle(sample, restitution, *sds)
         if i < 0:
             most = 1.0 if role[j] == PUCK else restitution
             restitution = wall_restitution(-speed, row[WALL_E], row[WALL_SLOPE])
@@ -248,9 +259,9 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             friction = row[WALL_MU] if role[j] == PUCK else 0.0
             scatters = row[WALL_E_SD] > 0.0 or row[WALL_EXIT_SD] > 0.0
             if role[j] == PUCK and scatters:
-                luck = draw(keys[b], collisions[b], movers * (movers - i) + j)
+                sample = draw(keys[b], collisions[b], movers * (movers - i) + j)
                 sds = row[WALL_E_SD], row[WALL_EXIT_SD]
-                restitution, kick = at_wall(luck, -speed, restitution, *sds)
+                restitution, kick = at_wall(sample, -speed, restitution, *sds)
         pairs[n, 0], pairs[n, 1] = i, j
         contacts[n, NX], contacts[n, NY] = nx, ny
         contacts[n, RESTITUTION], contacts[n, FRICTION] = restitution, friction
@@ -277,19 +288,19 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             path[b, moment, i, 2], path[b, moment, i, 3] = m[i, VX], m[i, VY]
 
     for b in range(len(coefficients)):
-        if not busy[b]:
+        if not active[b]:
             continue
         enter(b)
         keep_below_the_cap()
         world = m, role, coefficients[b], walls, obstacles, held, edges
         left, rounds, moment, count = control_dt, 0, 0, 0
-        # Nothing to be taken apart before the first drift.
+        # Nothing to be taken apart before the first move.
         stale, solved, apart, bend, jam = True, False, True, 0.0, False
         while True:
             rounds += 1
             if stale:
-                count = list_near(*world, left, near)
-                bend, stale = longest_drift(m, role, near, count), False
+                count = list_pairs(*world, left, near)
+                bend, stale = longest_move(m, role, near, count), False
             n, hits, deep, safe = 0, False, False, np.inf
             for k in range(count):
                 i, j = near[k, 0], near[k, 1]
@@ -333,7 +344,7 @@ def advance_busy(batch: Batch, busy: Array, work: Array, indices: Array) -> None
             h = min(max(JAMMED * bend if jam else bend, safe), left, until)
             if rounds > 60:
                 h = min(max(h, control_dt / 50), left)
-            h, stale, jam = drift(
+            h, stale, jam = move_to_impact(
                 *world,
                 goal_lines,
                 near,

@@ -1,4 +1,4 @@
-"""Drift: motion of one world up to the first touch on the way."""
+"""Time of impact: the bodies of one world move up to their first contact."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ from marl_airhockey.sim.backends.numba.bodies import (
     closing,
     distance_between,
 )
+from marl_airhockey.sim.backends.numba.broad_phase import BOW, list_near_drift
 from marl_airhockey.sim.backends.numba.geometry import (
     ahead_of_mouth,
     distance_to_fixed,
     in_contact,
 )
 from marl_airhockey.sim.backends.numba.impacts import solve
-from marl_airhockey.sim.backends.numba.near import BOW, list_near_drift
 from marl_airhockey.sim.core.laws import fly, slide
 from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
@@ -62,7 +62,7 @@ LATER = 1.1
 
 
 @inner(error_model="numpy", forceinline=True)
-def drift(
+def move_to_impact(
     m: Array,
     role: Array,
     row: Array,
@@ -94,8 +94,8 @@ def drift(
         row: coefficients of the world.
         walls: walls.
         obstacles: obstacles.
-        held: see `list_near`.
-        edges: see `list_near`.
+        held: see `list_pairs`.
+        edges: see `list_pairs`.
         goal_lines: see `Static`.
         near: pairs that can meet (count or more, 2).
         count: their number.
@@ -111,7 +111,7 @@ def drift(
         jam: see `solve`.
 
     Returns:
-        The length of the drift, s, True if ``near`` must be listed again, and whether
+        The time moved, s, True if ``near`` must be listed again, and whether
         paddles have yielded to pucks.
     """
     stale, most, last, tried = False, h, 0.0, h
@@ -172,7 +172,7 @@ def drift(
 
 @inner(error_model="numpy")
 def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> float:
-    """Return the longest drift in which discs that slide on each other part by `BOW`.
+    """Return the longest move in which discs that slide on each other part by `BOW`.
 
     They part as a tangent does from its circle; ``at`` is the column of velocities.
     """
@@ -189,7 +189,7 @@ def _longest_slide(m: Array, at: int, pairs: Array, contacts: Array, n: int) -> 
 
 @inner(error_model="numpy", forceinline=True)
 def _move_freely(m: Array, role: Array, row: Array, left: float, h: float) -> None:
-    """Fill the mean and last velocities of a drift without contacts."""
+    """Fill the mean and last velocities of a move without contacts."""
     for i in range(len(m)):
         vx, vy = m[i, VX], m[i, VY]
         if m[i, MASS] == 0.0:

@@ -1,4 +1,4 @@
-"""Near pairs: what can meet in a while, so that all else need not be looked at."""
+"""Broad phase: the pairs that can meet in a while; no others are looked at."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from marl_airhockey.sim.jit.cache import inner
 from marl_airhockey.types import Array
 
 BOW = 3e-4
-"""Distance of a curved way from its chord that a drift may have (m)."""
+"""Distance of a curved way from its chord that a move may have (m)."""
 
 
 @inner(error_model="numpy", forceinline=True)
-def list_near(
+def list_pairs(
     m: Array,
     role: Array,
     row: Array,
@@ -118,7 +118,7 @@ def list_near_drift(
     h: float,
     near: Array,
 ) -> int:
-    """List the pairs that can meet in h s at the mean velocities of a drift."""
+    """List the pairs that can meet in h s at the mean velocities of a move."""
     count, fixed = 0, len(walls) + len(obstacles)
     for j in range(len(m)):
         low, high = fixed_range(m, role, j, held, edges, fixed)
@@ -133,8 +133,8 @@ def list_near_drift(
 
 
 @inner(error_model="numpy", forceinline=True)
-def longest_drift(m: Array, role: Array, near: Array, count: int) -> float:
-    """Return the longest drift whose chords are true to `BOW`, s."""
+def longest_move(m: Array, role: Array, near: Array, count: int) -> float:
+    """Return the longest move whose chords are true to `BOW`, s."""
     bend = 0.0
     for k in range(count):
         i, j = near[k, 0], near[k, 1]
