@@ -51,9 +51,9 @@ class Rollout:
     density: Tensor
     """Log density of the actions"""
     reward: Tensor
-    going: Tensor
+    not_done: Tensor
     """0 where an episode ended with the step, else 1"""
-    cut: list[tuple[int, int, Any]]
+    truncated: list[tuple[int, int, Any]]
     """Step, slot and last observation of episodes that the clock ended"""
     success: list[bool]
     """Success of the episodes that ended"""
@@ -114,7 +114,7 @@ class Trainer:
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
         self._log = RunLog(run.folder, run.progress.steps)
-        self._seen = self._env.reset()
+        self._observation = self._env.reset()
         end_setup(run)
 
     def train(self) -> Metrics:
@@ -149,7 +149,7 @@ class Trainer:
         """Play ``n_steps`` steps of all slots."""
         config, env, model = self._config, self._env, self.model
         shape = config.n_steps, env.num_envs
-        kept = Rollout(
+        rollout = Rollout(
             torch.empty(*shape, len(model.centre)),
             torch.empty(*shape, 2),
             torch.empty(shape),
@@ -161,52 +161,54 @@ class Trainer:
         with torch.inference_mode():
             spread = torch.exp(model.log_std)
             for t in range(config.n_steps):
-                kept.observation[t] = model.scaled(torch.from_numpy(self._seen))
-                mean = model.actor(kept.observation[t])
+                rollout.observation[t] = model.scaled(
+                    torch.from_numpy(self._observation)
+                )
+                mean = model.actor(rollout.observation[t])
                 action = mean + spread * torch.randn_like(mean)
-                kept.action[t] = action
-                kept.density[t] = model.log_density(mean, action)
-                asked = action.clamp(-1.0, 1.0).numpy()
-                self._seen, reward, done, infos = env.step(asked)
-                kept.reward[t] = torch.from_numpy(reward)
-                kept.going[t] = torch.from_numpy(1.0 - done)
+                rollout.action[t] = action
+                rollout.density[t] = model.log_density(mean, action)
+                clipped = action.clamp(-1.0, 1.0).numpy()
+                self._observation, reward, done, infos = env.step(clipped)
+                rollout.reward[t] = torch.from_numpy(reward)
+                rollout.not_done[t] = torch.from_numpy(1.0 - done)
                 ended = np.flatnonzero(done).tolist()
-                kept.success += [infos[i]["is_success"] for i in ended]
-                kept.cut += [
+                rollout.success += [infos[i]["is_success"] for i in ended]
+                rollout.truncated += [
                     (t, i, infos[i]["terminal_observation"])
                     for i in ended
                     if infos[i]["TimeLimit.truncated"]
                 ]
                 note_step(self._log, env)
-        return kept
+        return rollout
 
-    def _advantages(self, kept: Rollout) -> tuple[Tensor, Tensor]:
-        """Return advantages and wanted values (T, n) (Schulman et al., 2016)."""
+    def _advantages(self, rollout: Rollout) -> tuple[Tensor, Tensor]:
+        """Return advantages and returns (T, n) (Schulman et al., 2016)."""
         config, model = self._config, self.model
         with torch.inference_mode():
-            value = model.critic(kept.observation)[..., 0]
-            last = model.critic(model.scaled(torch.from_numpy(self._seen)))[:, 0]
-            reward = kept.reward
-            if kept.cut:
-                steps, slots, seen = zip(*kept.cut, strict=True)
+            value = model.critic(rollout.observation)[..., 0]
+            last = model.critic(model.scaled(torch.from_numpy(self._observation)))[:, 0]
+            reward = rollout.reward
+            if rollout.truncated:
+                steps, slots, seen = zip(*rollout.truncated, strict=True)
                 beyond = model.critic(model.scaled(torch.from_numpy(np.stack(seen))))
                 reward[list(steps), list(slots)] += config.gamma * beyond[:, 0]
             settings = config.gamma, config.gae_lambda
             advantage = generalized_advantage(
-                reward, value, last, kept.going, *settings
+                reward, value, last, rollout.not_done, *settings
             )
             return advantage, advantage + value
 
-    def _update(self, kept: Rollout, remaining: float) -> float:
+    def _update(self, rollout: Rollout, remaining: float) -> float:
         """Improve the policy; return the KL divergence in the last epoch."""
         config, rate = self._config, self._rate(max(remaining, 0.0))
         for group in self._optimizer.param_groups:
             group["lr"] = rate
-        advantage, wanted = self._advantages(kept)
+        advantage, returns = self._advantages(rollout)
         flat = [
-            kept.observation.flatten(0, 1),
-            kept.action.flatten(0, 1),
-            *(x.flatten() for x in (kept.density, advantage, wanted)),
+            rollout.observation.flatten(0, 1),
+            rollout.action.flatten(0, 1),
+            *(x.flatten() for x in (rollout.density, advantage, returns)),
         ]
         size, divergences = len(flat[-1]), [0.0]
         for _ in range(config.n_epochs):
@@ -226,7 +228,7 @@ class Trainer:
         action: Tensor,
         density: Tensor,
         advantage: Tensor,
-        wanted: Tensor,
+        returns: Tensor,
     ) -> float:
         """Descend once on a part of a rollout; return its KL divergence."""
         model, clip = self.model, self._config.clip_range
@@ -235,7 +237,7 @@ class Trainer:
         advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
         clipped = ratio.clamp(1.0 - clip, 1.0 + clip)
         loss = -torch.min(ratio * advantage, clipped * advantage).mean()
-        error = nn.functional.mse_loss(model.critic(observation)[:, 0], wanted)
+        error = nn.functional.mse_loss(model.critic(observation)[:, 0], returns)
         # The entropy of a normal law is its log deviation and a constant.
         loss = loss + VALUE_WEIGHT * error - self._config.ent_coef * model.log_std.sum()
         self._optimizer.zero_grad(set_to_none=True)
@@ -277,8 +279,8 @@ class Trainer:
         """
         if (run / "config.toml").exists():
             load_config(PPOConfig, run / "config.toml")
-        kept = [run / f"{name}.pt" for name in ("best", "last")]
-        path = next((file for file in kept if file.exists()), None)
+        files = [run / f"{name}.pt" for name in ("best", "last")]
+        path = next((file for file in files if file.exists()), None)
         if path is None:
             raise ValueError(f"init: {run} is no folder of a run of the engine torch")
         self._load(path, whole=False)
