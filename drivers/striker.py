@@ -43,7 +43,9 @@ class Striker(tactics.Scripted):
         bodies = state.bodies
         touch = bodies.radius[view.seat] + bodies.radius[bodies.paddles]
 
-        due, place = self._predict(puck, velocity, low + self.meet_at)
+        table = view.scene.table
+        half = table.size[1] / 2 - table.puck_radius
+        due, place = self._predict(puck, velocity, low + self.meet_at, half)
         rests = length(velocity) < 0.05
         place = np.where(rests[:, None], puck, place)
         out = self._target(view) - place
@@ -77,13 +79,15 @@ class Striker(tactics.Scripted):
         return self._paced(action, view)
 
     def _predict(
-        self, puck: Array, velocity: Array, line: float
+        self, puck: Array, velocity: Array, line: float, half: float
     ) -> tuple[Array, Array]:
-        """Predict when (W,) and where (W, 2) a puck falls to a line, banks included."""
+        """Predict when (W,) and where (W, 2) a puck falls to a line, banks included.
+
+        The puck's centre stays within ``half`` of the middle, m.
+        """
         drop = np.maximum(puck[:, 0] - line, 0.0)
         speed = velocity[:, 0]
         due = (speed + np.sqrt(speed * speed + 2 * self.pull * drop)) / self.pull
-        half = 0.3048 - 0.03175
         far = puck[:, 1] + velocity[:, 1] * due + half
         folded = half - np.abs(far % (4 * half) - 2 * half)
         below = puck[:, 0] < line

@@ -155,21 +155,20 @@ class Trainer:
             torch.empty(shape),
             torch.empty(shape),
             torch.ones(shape),
-            [],
-            [],
+            truncated=[],
+            success=[],
         )
         with torch.inference_mode():
             spread = torch.exp(model.log_std)
             for t in range(config.n_steps):
-                rollout.observation[t] = model.scaled(
-                    torch.from_numpy(self._observation)
-                )
-                mean = model.actor(rollout.observation[t])
+                observation = model.scaled(torch.from_numpy(self._observation))
+                rollout.observation[t] = observation
+                mean = model.actor(observation)
                 action = mean + spread * torch.randn_like(mean)
                 rollout.action[t] = action
                 rollout.density[t] = model.log_density(mean, action)
-                clipped = action.clamp(-1.0, 1.0).numpy()
-                self._observation, reward, done, infos = env.step(clipped)
+                step = env.step(action.clamp(-1.0, 1.0).numpy())
+                self._observation, reward, done, infos = step
                 rollout.reward[t] = torch.from_numpy(reward)
                 rollout.not_done[t] = torch.from_numpy(1.0 - done)
                 ended = np.flatnonzero(done).tolist()
@@ -247,8 +246,7 @@ class Trainer:
         return float((ratio.detach() - 1.0 - change.detach()).mean())
 
     def _policy(self) -> NumpyPolicy:
-        labels = self._env.world.observer.layout.labels
-        card = self._config.card(labels)
+        card = self._config.card(self._env.world.observer.layout.labels)
         return self.model.to_numpy({**card, "steps": self._run.progress.steps})
 
     def _snapshot(self) -> None:
@@ -275,7 +273,7 @@ class Trainer:
         """Take the weights of a run, of its best policy if there is one.
 
         Raises:
-            ValueError: no run of this engine, one of an older version or another size.
+            ValueError: no run of this engine, one of another format or size.
         """
         if (run / "config.toml").exists():
             load_config(PPOConfig, run / "config.toml")

@@ -82,6 +82,13 @@ def test_a_script_is_an_honest_baseline(task, script, bar):
     assert low <= result.success <= high
 
 
+@pytest.mark.parametrize(("task", "bar"), [("juggle", 0.9), ("touch", 0.95)])
+def test_the_striker_knows_the_width_of_its_table(task, bar):
+    options = {"table": "full_size"}
+    found = evaluate("striker", task, episodes=100, exact=True, options=options)
+    assert found.success >= bar
+
+
 def test_a_driver_keeps_its_own_pace():
     driver = ah.make_driver("random")
     driver.control_dt = 0.15

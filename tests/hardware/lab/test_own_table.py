@@ -37,7 +37,11 @@ def commands():
 def announced_lab():
     pytest.importorskip("rtde_control")
     command = [sys.executable, "-m", "marl_airhockey.cli", "lab"]
-    lab = subprocess.Popen([*command, "--frame-rate", "60", "--seed", "3"])
+    lab = subprocess.Popen(
+        [*command, "--frame-rate", "60", "--seed", "3"],
+        # A shell ignores it for what it runs in the background.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     deadline = time.monotonic() + 60
     while (client := LabClient.find()) is None and time.monotonic() < deadline:
         time.sleep(0.2)
