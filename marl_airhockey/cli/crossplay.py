@@ -8,38 +8,33 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli.options import (
-    AsJson,
-    Backend,
-    Drivers,
-    Options,
-    Profile,
-    Trusting,
+from marl_airhockey.cli.environment import (
+    Simulation,
     as_trained_unless_given,
-    console,
-    environment,
+    in_environment,
 )
+from marl_airhockey.cli.options import AsJson, Drivers, console, settings
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.evaluation.crossplay import CrossPlay
 from marl_airhockey.evaluation.crossplay import crossplay as play_crossplay
 from marl_airhockey.evaluation.evaluate import TEST_SEED
-from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
+from marl_airhockey.registry import make_driver
 
 
+@in_environment
 def crossplay(
     scenario: Annotated[str, typer.Argument(help="A game of teams of two or more.")],
     players: Annotated[list[str], typer.Argument(help="Drivers and policies.")],
-    episodes: Annotated[int, typer.Option(help="Of each pair.", min=1)] = 200,
-    backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = None,
-    option: Options = None,
+    environment: Simulation,
+    episodes: Annotated[int, typer.Option(help="Episodes of each pair.", min=1)] = 200,
     driver: Drivers = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,
-    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Let players play with teammates that they do not know: the coordination gap."""
-    keywords = environment(backend, profile, option, driver)
+    keywords = environment.keywords
+    if driver:
+        keywords["drivers"] = settings(driver)
     teammates = {name: make_driver(name) for name in players}
     _, keywords, teammates = as_trained_unless_given(
         teammates, scenario, keywords, as_json

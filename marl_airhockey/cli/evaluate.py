@@ -11,29 +11,13 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli.options import (
-    AsJson,
-    Backend,
-    ControlDt,
-    Drivers,
-    Observe,
-    Options,
-    Physics,
-    Profile,
-    Scenario,
-    Trusting,
-    Workers,
+from marl_airhockey.cli.environment import (
+    Environment,
     as_trained_unless_given,
-    console,
-    environment,
+    in_environment,
 )
+from marl_airhockey.cli.options import AsJson, Scenario, Workers, console
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.cli.real_table import (
-    LabOption,
-    RigOption,
-    name_on_table,
-    real_table,
-)
 from marl_airhockey.data.files import is_recording
 from marl_airhockey.evaluation.evaluate import (
     TEST_SEED,
@@ -43,36 +27,29 @@ from marl_airhockey.evaluation.evaluate import (
 )
 from marl_airhockey.evaluation.over_runs import OverRuns
 from marl_airhockey.policies.policy import Policy
-from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_driver
+from marl_airhockey.registry import REAL, make_driver
 
 FLOORS = ("still", "random", "sticky")
 """Drivers without skill that results are compared with."""
 
 
+@in_environment
 def evaluate_driver(
-    driver: Annotated[
+    drivers: Annotated[
         list[str],
         typer.Argument(
+            metavar="DRIVER...",
             help="Name of a driver, path of a policy, or folder of a recording. "
             "Several runs, of different seeds, are summed up with an interval over "
-            "them."
+            "them.",
         ),
     ],
+    environment: Environment,
     scenario: Scenario = None,
-    backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = None,
-    episodes: Annotated[int, typer.Option(help="How many.")] = 200,
-    seed: Annotated[int, typer.Option(help="Of the first episode.")] = TEST_SEED,
-    option: Options = None,
-    other: Drivers = None,
-    physics: Physics = None,
-    observe: Observe = None,
-    control_dt: ControlDt = None,
+    episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 200,
+    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,
     floors: Annotated[bool, typer.Option(help="still, random, sticky too.")] = True,
     num_workers: Workers = None,
-    lab: LabOption = False,
-    rig: RigOption = None,
-    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Measure a driver over episodes that training never sees.
@@ -84,25 +61,23 @@ def evaluate_driver(
 
     A recording is measured as it was played; options of the environment have no effect.
     """
-    recorded = [is_recording(Path(name)) for name in driver]
+    recorded = [is_recording(Path(name)) for name in drivers]
     if all(recorded):
-        _report([evaluate_recording(Path(name)) for name in driver], None, as_json)
+        _report([evaluate_recording(Path(name)) for name in drivers], None, as_json)
         return
     if any(recorded):
         raise ValueError(
             "recordings and drivers: evaluate them by commands of their own"
         )
-    keywords = environment(
-        backend, profile, option, other, physics, control_dt, observe
-    )
-    if episodes < 1:
-        raise ValueError(f"--episodes: {episodes} must be at least 1")
-    names = [name_on_table(name, backend) for name in driver]
+    names = [environment.on_table(name) for name in drivers]
     scenario, keywords, players = as_trained_unless_given(
-        {name: make_driver(name) for name in names}, scenario, keywords, as_json
+        {name: make_driver(name) for name in names},
+        scenario,
+        environment.keywords,
+        as_json,
     )
     entries, first = list(players.items()), players[names[0]]
-    simulated = backend != REAL
+    simulated = environment.backend != REAL
     alone = isinstance(first, Policy) and first.can_sample and len(entries) == 1
     if isinstance(first, Policy) and alone and simulated:
         sampled = replace(first, deterministic=False)
@@ -110,7 +85,7 @@ def evaluate_driver(
     if floors and simulated:
         entries += [(f, make_driver(f)) for f in FLOORS if f not in names]
     results: list[EvaluationResult] = []
-    with real_table(keywords, lab, rig) as keywords, bar() as progress:
+    with environment.table(keywords) as keywords, bar() as progress:
         task = progress.add_task(scenario, total=len(entries), note="")
         for name, entry in entries:
             progress.update(task, note=name)

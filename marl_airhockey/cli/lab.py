@@ -9,14 +9,13 @@ from typing import Annotated
 import typer
 
 from marl_airhockey.cli import play as cli_play
+from marl_airhockey.cli.environment import TableEnvironment
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.cli.real_table import name_on_table, real_table
 from marl_airhockey.hardware.lab.faults import FAULTS
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.registry import REAL, find_backend
 from marl_airhockey.sim.core.errors import require
-from marl_airhockey.sim.world.keywords import Keywords
 
 GAME, PLAYER = "juggle", "zoo/juggle"
 """Scenario and player of the demo"""
@@ -79,9 +78,9 @@ def show_demo(host: str, port: int, browser: bool) -> None:
     require("uvicorn", "play")
     from marl_airhockey.play.real_match import RealMatch
 
-    keywords: Keywords = {"backend": REAL}
-    with real_table(keywords, True, None) as table:
-        match = RealMatch(GAME, {"paddle_0": name_on_table(PLAYER, REAL)}, table)
+    environment = TableEnvironment(lab=True)
+    with environment.table(environment.keywords) as table:
+        match = RealMatch(GAME, {"paddle_0": environment.on_table(PLAYER)}, table)
         match.again = True
         cli_play.host_match(match, None, host, port, browser)
 

@@ -10,20 +10,16 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli.options import (
-    AsJson,
-    Backend,
-    Options,
-    Profile,
-    Trusting,
+from marl_airhockey.cli.environment import (
+    Simulation,
     as_trained_unless_given,
-    console,
-    environment,
+    in_environment,
 )
+from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.progress import bar
 from marl_airhockey.evaluation.league import LEAGUE_SEED, find_policies, league
 from marl_airhockey.evaluation.standings import Standings
-from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.core.errors import require
 
 SCRIPTS = (
@@ -37,8 +33,10 @@ SCRIPTS = (
 """Scripts that play if no players are given."""
 
 
+@in_environment
 def play_league(
     scenario: Annotated[str, typer.Argument(help="A game of two sides or more.")],
+    environment: Simulation,
     players: Annotated[
         list[str] | None,
         typer.Argument(help="Drivers and policies; all scripts if none are given."),
@@ -50,9 +48,6 @@ def play_league(
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Folder of table and picture.")
     ] = Path("runs/league"),
-    backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = None,
-    option: Options = None,
     seed: Annotated[int, typer.Option(help="Seed of the first game.")] = LEAGUE_SEED,
     exploit: Annotated[
         int | None,
@@ -63,7 +58,6 @@ def play_league(
     exploit_seeds: Annotated[
         int, typer.Option(help="Best responses to each, of seeds 0 .. N - 1.", min=1)
     ] = 1,
-    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Let everybody play everybody: ratings, matrix, cycles of wins."""
@@ -71,10 +65,9 @@ def play_league(
     given = players or ([] if folder else SCRIPTS)
     entries = [*given, *(find_policies(folder) if folder else [])]
     names = [str(entry) for entry in entries]
-    keywords = environment(backend, profile, option, None)
     entrants = {label(str(entry), names): make_driver(entry) for entry in entries}
     _, keywords, entrants = as_trained_unless_given(
-        entrants, scenario, keywords, as_json
+        entrants, scenario, environment.keywords, as_json
     )
     with bar() as progress:
         task = progress.add_task(f"league of {len(entrants)}", total=1.0, note="")

@@ -12,14 +12,8 @@ import typer
 from marl_airhockey import __version__
 from marl_airhockey.cli import (
     bench,
-    calibrate,
-    calibrate_arm,
-    calibrate_delay,
     challenge,
     crossplay,
-    data,
-    data_files,
-    data_sets,
     evaluate,
     fit,
     lab,
@@ -36,6 +30,8 @@ from marl_airhockey.cli import (
     ur_emulator,
     watch,
 )
+from marl_airhockey.cli.calibrate import arm, camera, delay
+from marl_airhockey.cli.data import files, recordings, sets
 from marl_airhockey.plugins import author_files
 
 
@@ -72,22 +68,22 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 """Functions of the commands, by name"""
 GROUPS = {
-    "data": data.data,
+    "data": recordings.data,
     "study": study.study,
-    "calibrate": calibrate.calibrate,
+    "calibrate": camera.calibrate,
     "lab": lab.lab,
     "ur-emulator": ur_emulator.ur_emulator,
 }
 """Groups of commands, by name"""
 for name, function in COMMANDS.items():
     app.command(name)(function)
-calibrate.calibrate.command()(calibrate_delay.delay)
-calibrate.calibrate.command()(calibrate_arm.arm)
-for function in data_files.COMMANDS:
-    data.data.command()(function)
-data.data.command("import")(data_files.import_dataset)
-data.data.command("get")(data_sets.get)
-data.data.command("list")(data_sets.list_datasets)
+for function in (delay.delay, arm.arm):
+    camera.calibrate.command()(function)
+for function in files.COMMANDS:
+    recordings.data.command()(function)
+recordings.data.command("import")(files.import_dataset)
+recordings.data.command("get")(sets.get)
+recordings.data.command("list")(sets.list_datasets)
 for name, group in GROUPS.items():
     app.add_typer(group, name=name)
 

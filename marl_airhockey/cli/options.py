@@ -9,17 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.console import Console
 
-from marl_airhockey.cli.progress import bar, errors
+from marl_airhockey.cli.progress import bar
 from marl_airhockey.policies.trust import Trust
-from marl_airhockey.rollout.as_trained import (
-    as_trained,
-    describe_environment,
-    seen_in,
-)
-from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.core.physics import load_physics
 from marl_airhockey.sim.jit.threads import use_threads
-from marl_airhockey.sim.world.keywords import Keywords
 
 if TYPE_CHECKING:
     from marl_airhockey.learn.algorithms import AnyConfig
@@ -40,20 +33,6 @@ Profile = Annotated[
     typer.Option(
         help="ideal, ur5e, ur5e-authors, gantry, or a file of airhockey fit-table; by "
         "default that of the policy's training, else ideal."
-    ),
-]
-Observe = Annotated[
-    str | None,
-    typer.Option(
-        help="Form of observations: velocity, estimate or history; by default that of "
-        "the policy's training."
-    ),
-]
-ControlDt = Annotated[
-    float | None,
-    typer.Option(
-        help="Time between two actions, s; by default that of the policy's training, "
-        "else 0.05."
     ),
 ]
 Options = Annotated[
@@ -145,59 +124,6 @@ def physics_of(given: list[str] | None) -> dict[str, Any]:
             )
         found[name] = numbers[0] if len(numbers) == 1 else tuple(numbers)
     return loaded | found
-
-
-def environment(
-    backend: str,
-    profile: str | None,
-    option: list[str] | None,
-    driver: list[str] | None,
-    physics: list[str] | None = None,
-    control_dt: float | None = None,
-    observe: str | None = None,
-) -> Keywords:
-    """Return an environment's keywords from the options that were given."""
-    keywords: Keywords = {"backend": backend}
-    if profile is not None:
-        keywords["profile"] = profile
-    if option:
-        keywords["options"] = settings(option)
-    if driver:
-        keywords["drivers"] = settings(driver)
-    if physics:
-        keywords["physics"] = physics_of(physics)
-    if control_dt is not None:
-        keywords["control_dt"] = control_dt
-    if observe is not None:
-        keywords["observe"] = observe
-    return keywords
-
-
-def as_trained_unless_given(
-    players: dict[str, Driver],
-    scenario: str | None,
-    keywords: Keywords,
-    quiet: bool = False,
-) -> tuple[str, Keywords, dict[str, Driver]]:
-    """Fill in what was not given from what the players were trained in, and print it.
-
-    Args:
-        players: Drivers by name.
-        scenario: Scenario, if it was given.
-        keywords: Keywords that were given.
-        quiet: Whether the line goes to standard error, as the output is JSON.
-
-    Returns:
-        Scenario, keywords, and the players with the observations that were given.
-    """
-    found, keywords = as_trained(players, scenario, keywords)
-    assert isinstance(found, str)
-    players = {name: seen_in(player, keywords) for name, player in players.items()}
-    line = describe_environment(found, keywords, players)
-    (errors if quiet else console).print(
-        line, soft_wrap=True, markup=False, highlight=False
-    )
-    return found, keywords, players
 
 
 def measure_of(row: dict[str, float]) -> str:

@@ -12,20 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from marl_airhockey.cli.options import (
-    Backend,
-    Options,
-    Profile,
-    Trusting,
+from marl_airhockey.cli.environment import (
+    Environment,
     as_trained_unless_given,
-    console,
-    environment,
-    settings,
+    in_environment,
 )
+from marl_airhockey.cli.options import console, settings
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
 from marl_airhockey.play.handicap import BOUNDS, PRESETS, USUAL, Handicap
-from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_driver
+from marl_airhockey.registry import REAL, make_driver
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -65,21 +60,14 @@ Pace = Annotated[
 ]
 
 
+@in_environment
 def play(
-    scenario: Annotated[str, typer.Argument(help="What is played.")],
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")],
+    environment: Environment,
     opponent: Annotated[
         str | None,
         typer.Option(help="Who sits at all other seats; of the zoo if it has one."),
     ] = None,
-    driver: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Who drives one seat, AGENT=NAME, person for people; repeatable."
-        ),
-    ] = None,
-    backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = None,
-    option: Options = None,
     reaction: Reaction = None,
     noise: Noise = None,
     pace: Pace = None,
@@ -93,23 +81,24 @@ def play(
     host: Host = "127.0.0.1",
     port: Port = 8480,
     browser: Browser = True,
-    lab: LabOption = False,
-    rig: RigOption = None,
-    trust: Trusting = False,
 ) -> None:
-    """Play against a policy, a script or each other in the browser."""
+    """Play against a policy, a script or each other in the browser.
+
+    With --driver AGENT=person people take that seat.
+    """
     require("starlette", "play")
     require("uvicorn", "play")
     from marl_airhockey.play.live_match import LiveMatch
     from marl_airhockey.play.real_match import RealMatch
 
-    kind = RealMatch if backend == REAL else LiveMatch
-    keywords = environment(backend, profile, option, None, control_dt=kind.CONTROL_DT)
-    seats = settings(driver)
+    kind = RealMatch if environment.backend == REAL else LiveMatch
+    keywords, seats = environment.keywords, settings(environment.driver)
+    keywords.pop("drivers", None)
+    keywords.setdefault("control_dt", kind.CONTROL_DT)
     keywords = _as_trained(scenario, {opponent, *seats.values()}, keywords)
     limits = {"reaction": reaction, "noise": noise, "pace": pace}
     given = {name: value for name, value in limits.items() if value is not None}
-    with real_table(keywords, lab, rig) as table:
+    with environment.table(keywords) as table:
         match = kind(scenario, {}, table, Handicap(**given))
         seat_drivers(match, opponent, seats)
         if not given and kind is LiveMatch and match.has_opponents:

@@ -4,26 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from marl_airhockey.cli import play as cli_play
-from marl_airhockey.cli.options import (
-    Backend,
-    Options,
-    Profile,
-    environment,
-)
+from marl_airhockey.cli.environment import TableEnvironment, in_environment
 from marl_airhockey.cli.progress import waiting
-from marl_airhockey.cli.real_table import LabOption, RigOption, real_table
 from marl_airhockey.registry import REAL
 from marl_airhockey.sim.core.errors import require
 
 
+@in_environment
 def teleop(
-    scenario: Annotated[str, typer.Argument(help="What is played.")],
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario.")],
+    environment: TableEnvironment,
     by: Annotated[
         Literal["mouse", "shadow"],
         typer.Option(help="The page's pointer, or a hand under a camera of its own."),
@@ -41,14 +38,9 @@ def teleop(
     opponent: Annotated[
         str | None, typer.Option(help="Who sits at all other seats.")
     ] = None,
-    backend: Backend = REAL,
-    profile: Profile = None,
-    option: Options = None,
     host: cli_play.Host = "127.0.0.1",
     port: cli_play.Port = 8480,
     browser: cli_play.Browser = True,
-    lab: LabOption = False,
-    rig: RigOption = None,
 ) -> None:
     """Lead the paddle yourself, on a real table by its live video, and record it.
 
@@ -61,14 +53,15 @@ def teleop(
     from marl_airhockey.play.match_drivers import PERSON
     from marl_airhockey.play.real_match import RealMatch
 
-    real = backend == REAL
+    real = environment.backend == REAL
     if by == "mouse" and hand is not None:
         raise ValueError("--hand: add --by shadow")
-    keywords = environment(backend, profile, option, None)
-    # Of a simulated table the lab has the hand alone.
+    own = environment
+    if not real:  # Of a simulated table the lab has the hand alone.
+        own = replace(environment, lab=False)
     with (
-        real_table(keywords, lab and real, rig) as table,
-        hand_file(by == "shadow", hand, lab) as path,
+        own.table(own.keywords) as table,
+        hand_file(by == "shadow", hand, environment.lab) as path,
     ):
         match = (RealMatch if real else LiveMatch)(scenario, {}, table)
         leader = (

@@ -10,28 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli.options import (
-    AsJson,
-    Backend,
-    Drivers,
-    Options,
-    Physics,
-    Profile,
-    Trusting,
+from marl_airhockey.cli.environment import (
+    Environment,
     as_trained_unless_given,
-    console,
-    environment,
+    in_environment,
 )
+from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.options import Scenario as ScenarioOption
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.cli.real_table import (
-    LabOption,
-    RigOption,
-    name_on_table,
-    real_table,
-)
 from marl_airhockey.data.files import is_recording
-from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
+from marl_airhockey.registry import make_driver
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 
@@ -42,6 +30,7 @@ if TYPE_CHECKING:
 STARTS = "starts.csv"
 
 
+@in_environment
 def trials(
     policies: Annotated[
         list[str],
@@ -51,6 +40,7 @@ def trials(
             "METHOD (its seeds) are one.",
         ),
     ],
+    environment: Environment,
     scenario: ScenarioOption = None,
     out: Annotated[
         Path,
@@ -65,15 +55,7 @@ def trials(
     operator: Annotated[
         str, typer.Option(help="Who puts the puck on the table, for the sheet.")
     ] = "",
-    seed: Annotated[int, typer.Option(help="Of the order.")] = 0,
-    backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = None,
-    option: Options = None,
-    other: Drivers = None,
-    physics: Physics = None,
-    lab: LabOption = False,
-    rig: RigOption = None,
-    trust: Trusting = False,
+    seed: Annotated[int, typer.Option(help="Seed of the order of trials.")] = 0,
     as_json: AsJson = False,
 ) -> None:
     """Compare policies on a table: same starts, in turns, the operator blinded.
@@ -82,34 +64,34 @@ def trials(
     """
     from marl_airhockey.evaluation.trial_sheet import plan_trials
 
-    methods = _methods([_on_table(text, backend) for text in policies])
+    methods = _methods([_on_table(text, environment) for text in policies])
     if recorded := _recordings(methods):
         _compare_recordings(recorded, as_json)
         return
     drivers = {
         name: [make_driver(path) for path in paths] for name, paths in methods.items()
     }
-    keywords = environment(backend, profile, option, other, physics)
     players = {
         f"{name} {number}": driver
         for name, some in drivers.items()
         for number, driver in enumerate(some)
     }
-    game, keywords, _ = as_trained_unless_given(players, scenario, keywords, as_json)
+    given, backend = environment.keywords, environment.backend
+    game, keywords, _ = as_trained_unless_given(players, scenario, given, as_json)
     where = {
         "backend": backend,
         "profile": keywords.get("profile", "ideal"),
-        "options": option or [],
-        "drivers": other or [],
-        "physics": " ".join(physics or []),
-        "table": "lab" if lab else str(rig or ""),
+        "options": environment.option or [],
+        "drivers": environment.driver or [],
+        "physics": " ".join(environment.physics or []),
+        "table": "lab" if environment.lab else str(environment.rig or ""),
         "operator": operator,
     }
 
     def plan(chosen: list[int]) -> TrialPlan:
         return plan_trials(game, methods, chosen, number, where, seed)
 
-    with real_table(keywords, lab, rig) as table:
+    with environment.table(keywords) as table:
         sheet = _play(drivers, game, table, min(starts, number), plan, out)
     found = sheet.compare()
     result = {**found.to_json(), "trials_an_hour": sheet.trials_an_hour}
@@ -183,10 +165,10 @@ def _play(
     return sheet
 
 
-def _on_table(text: str, backend: str) -> str:
+def _on_table(text: str, environment: Environment) -> str:
     """Return METHOD=POLICY with the policy that is for the table."""
     method, equals, policy = text.rpartition("=")
-    return method + equals + name_on_table(policy, backend)
+    return method + equals + environment.on_table(policy)
 
 
 def _methods(texts: list[str]) -> dict[str, list[str]]:

@@ -11,9 +11,9 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from marl_airhockey.cli.arm_motion import moving_arm, summarize
+from marl_airhockey.cli.calibrate.motion import moving_arm, summarize
+from marl_airhockey.cli.environment import LabOption
 from marl_airhockey.cli.options import AsJson, console
-from marl_airhockey.cli.real_table import LabOption
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.servo import HALF
 from marl_airhockey.types import Array

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from marl_airhockey.cli.data import show
+from marl_airhockey.cli.data.recordings import show
 from marl_airhockey.cli.options import Options, console, settings
 from marl_airhockey.sim.core.errors import require
 

@@ -10,26 +10,10 @@ import typer
 from rich.box import SIMPLE
 from rich.table import Table
 
-from marl_airhockey.cli.options import (
-    AsJson,
-    Backend,
-    Drivers,
-    Options,
-    Profile,
-    Trusting,
-    as_trained_unless_given,
-    console,
-    environment,
-)
+from marl_airhockey.cli.environment import Environment, in_environment
+from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.options import Scenario as ScenarioOption
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.cli.real_table import (
-    LabOption,
-    RigOption,
-    name_on_table,
-    real_table,
-)
-from marl_airhockey.registry import DEFAULT_BACKEND, make_driver
 from marl_airhockey.sim.core.errors import require
 
 data = typer.Typer(
@@ -38,30 +22,25 @@ data = typer.Typer(
 
 
 @data.command()
+@in_environment
 def record(
-    driver: Annotated[str, typer.Argument(help="A driver's name or a policy's path.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="DRIVER", help="Name of a driver, or path of a policy."),
+    ],
+    environment: Environment,
     scenario: ScenarioOption = None,
-    episodes: Annotated[int, typer.Option(help="How many.", min=1)] = 100,
+    episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 100,
     out: Annotated[
         Path | None,
         typer.Option(
             file_okay=False, help="Folder of the recording; recordings/TIME-SCENARIO."
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the first episode.")] = 0,
-    observe: Annotated[
-        str | None, typer.Option(help="Form of the observations that are kept.")
-    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     film: Annotated[
         bool, typer.Option("--film", help="Keep a real table's pictures beside it.")
     ] = False,
-    backend: Backend = DEFAULT_BACKEND,
-    profile: Profile = None,
-    option: Options = None,
-    other: Drivers = None,
-    lab: LabOption = False,
-    rig: RigOption = None,
-    trust: Trusting = False,
     as_json: AsJson = False,
 ) -> None:
     """Let a driver play and record it: states, observations, actions, rewards.
@@ -71,23 +50,15 @@ def record(
     from marl_airhockey.data.files import new_recording
     from marl_airhockey.data.record import record_episodes
 
-    keywords = environment(backend, profile, option, other)
-    name = name_on_table(driver, backend)
-    game, keywords, players = as_trained_unless_given(
-        {name: make_driver(name)}, scenario, keywords, as_json
-    )
-    player = players[name]
-    if observe is not None:
-        keywords["observe"] = observe
-    title = game if isinstance(game, str) else game.name
-    path = out or new_recording(Path("recordings"), title)
-    with real_table(keywords, lab, rig) as table, bar() as shown:
+    name, driver, game, keywords = environment.one_driver(name, scenario, as_json)
+    path = out or new_recording(Path("recordings"), game)
+    with environment.table(keywords) as table, bar() as shown:
         task = shown.add_task("recording", total=episodes, note="")
 
         def count(done: float) -> None:
             shown.update(task, completed=done)
 
-        record_episodes(player, name, game, episodes, path, seed, table, film, count)
+        record_episodes(driver, name, game, episodes, path, seed, table, film, count)
     show([path], as_json)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from marl_airhockey.cli.environment import rig_of
 from marl_airhockey.cli.progress import bar
-from marl_airhockey.cli.real_table import rig_of
 from marl_airhockey.hardware.rig import Rig
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.seat import make_seat
