@@ -119,21 +119,19 @@ class Trainer:
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""
-        run, row = self._run, self._run.latest
-        while run.steps_left > 0:
-            self._snapshot()
-            rollout = self._collect()
-            steps = run.progress.steps + rollout.reward.numel()
-            divergence = self._update(rollout, 1.0 - steps / self._config.total_steps)
-            self._rate.adapt(divergence)
-            self._widen(rollout.success)
-            run.update_progress(steps, self._rate.rate)
-            if run.evaluation_due or run.steps_left <= 0:
-                row = self._evaluate()
-            self._log.dump(steps)
-        self._log.close()
+        row = self._run.train(self._advance, self._evaluate, self._log)
         self._env.close()
         return row
+
+    def _advance(self) -> tuple[int, float]:
+        """Play a rollout and learn from it; return the steps so far and the rate."""
+        self._snapshot()
+        rollout = self._collect()
+        steps = self._run.progress.steps + rollout.reward.numel()
+        divergence = self._update(rollout, 1.0 - steps / self._config.total_steps)
+        self._rate.adapt(divergence)
+        self._widen(rollout.success)
+        return steps, self._rate.rate
 
     def _widen(self, success: list[bool]) -> None:
         """Widen the ranges of starts of a curriculum where they are mastered."""

@@ -9,10 +9,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.run_config import RunConfig
+
+if TYPE_CHECKING:
+    from marl_airhockey.learn.logs import RunLog
 
 ProgressCallback = Callable[[int, int, Metrics], None]
 """Function called with steps done, steps in all, and the latest evaluation"""
@@ -120,6 +123,33 @@ class TrainingRun(Generic[Config]):
     def evaluation_due(self) -> bool:
         """True if it is time for an evaluation."""
         return self.progress.steps >= self._next
+
+    def train(
+        self,
+        advance: Callable[[], tuple[int, float]],
+        evaluate: Callable[[], Metrics],
+        log: RunLog,
+    ) -> Metrics:
+        """Train from where the run is to its end; return the last evaluation.
+
+        Args:
+            advance: Function that learns for some steps; it returns the number of steps
+                since the beginning of the run, and the learning rate.
+            evaluate: Function that evaluates and saves the policy, see
+                `record_evaluation`; it returns the evaluation's row.
+            log: Log of the run, which is closed in the end.
+        """
+        row = self.latest
+        try:
+            while self.steps_left > 0:
+                steps, rate = advance()
+                self.update_progress(steps, rate)
+                if self.evaluation_due or self.steps_left <= 0:
+                    row = evaluate()
+                log.dump(steps)
+        finally:
+            log.close()
+        return row
 
     def end_setup(self) -> None:
         """Count the time until now as setup, what follows as learning."""

@@ -77,28 +77,19 @@ class Learner:
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""
-        try:
-            return self._train()
-        finally:
-            self._log.close()
+        self._run.end_setup()
+        return self._run.train(self._advance, self._evaluate, self._log)
 
-    def _train(self) -> Metrics:
-        run, row = self._run, self._run.latest
-        run.end_setup()
-        while run.steps_left > 0:
-            first = run.progress.steps
-            last = min(first + REPORT, self._config.total_steps)
-            losses: dict[str, float] = {}
-            for step in range(first, last):
-                # An actor may learn at every second step alone.
-                losses |= self.descend(step)
-            run.update_progress(last, self._config.learning_rate)
-            for name, value in losses.items():
-                self._log.record(f"train/{name}", value)
-            if run.evaluation_due or run.steps_left <= 0:
-                row = self._evaluate()
-            self._log.dump(last)
-        return row
+    def _advance(self) -> tuple[int, float]:
+        first = self._run.progress.steps
+        last = min(first + REPORT, self._config.total_steps)
+        losses: dict[str, float] = {}
+        for step in range(first, last):
+            # An actor may learn at every second step alone.
+            losses |= self.descend(step)
+        for name, value in losses.items():
+            self._log.record(f"train/{name}", value)
+        return last, self._config.learning_rate
 
     def descend(self, step: int) -> dict[str, float]:
         """Descend once on a batch of steps; return the losses."""

@@ -182,25 +182,19 @@ class PixelCloning:
 
     def train(self) -> Metrics:
         """Train to the end of the run; return the last evaluation."""
-        try:
-            return self._train()
-        finally:
-            self._log.close()
+        self._run.end_setup()
+        return self._run.train(self._advance, self._evaluate, self._log)
 
-    def _train(self) -> Metrics:
-        run, row, config = self._run, self._run.latest, self._config
-        run.end_setup()
-        while run.steps_left > 0:
-            first = run.progress.steps
-            last = min(first + REPORT, config.total_steps)
-            loss = float(np.mean([self._descend(k) for k in range(first, last)]))
-            run.update_progress(last, config.learning_rate)
-            self._log.record("train/actor", loss)
-            if run.evaluation_due or run.steps_left <= 0:
-                metrics = evaluate_policy(lambda _: self.model.driver(), config)
-                row = run.record_evaluation(metrics, self._save)
-            self._log.dump(last)
-        return row
+    def _advance(self) -> tuple[int, float]:
+        first = self._run.progress.steps
+        last = min(first + REPORT, self._config.total_steps)
+        loss = float(np.mean([self._descend(k) for k in range(first, last)]))
+        self._log.record("train/actor", loss)
+        return last, self._config.learning_rate
+
+    def _evaluate(self) -> Metrics:
+        found = evaluate_policy(lambda _: self.model.driver(), self._config)
+        return self._run.record_evaluation(found, self._save)
 
     def _descend(self, step: int) -> float:
         """Descend once on a batch of steps; return the loss."""
