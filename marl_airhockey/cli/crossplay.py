@@ -9,7 +9,7 @@ import typer
 from rich.table import Table
 
 from marl_airhockey.cli.environment import (
-    Simulation,
+    SimulationOptions,
     as_trained_unless_given,
     in_environment,
 )
@@ -25,7 +25,7 @@ from marl_airhockey.registry import make_driver
 def crossplay(
     scenario: Annotated[str, typer.Argument(help="A game of teams of two or more.")],
     players: Annotated[list[str], typer.Argument(help="Drivers and policies.")],
-    environment: Simulation,
+    environment: SimulationOptions,
     episodes: Annotated[int, typer.Option(help="Episodes of each pair.", min=1)] = 200,
     driver: Drivers = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,

@@ -66,7 +66,7 @@ RigOption = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Simulation:
+class SimulationOptions:
     """Options of a simulated environment; each field is an option of the command."""
 
     backend: Backend = DEFAULT_BACKEND
@@ -92,7 +92,7 @@ class Simulation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Environment(Simulation):
+class EnvironmentOptions(SimulationOptions):
     """Options of an environment, simulated or a real table."""
 
     driver: Drivers = None
@@ -158,7 +158,7 @@ class Environment(Simulation):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TableEnvironment(Environment):
+class TableOptions(EnvironmentOptions):
     """The same for commands that are for a real table unless another is given."""
 
     backend: Backend = REAL
@@ -168,7 +168,7 @@ def in_environment(command: Callable[..., None]) -> Callable[..., None]:
     """Return a command that takes the fields of its ``environment`` as options.
 
     Args:
-        command: Function with a parameter of that name: a `Simulation`, `Environment`.
+        command: Function with a parameter of that name, of a class above.
     """
     hints = typing.get_type_hints(command, include_extras=True)
     kind = hints["environment"]

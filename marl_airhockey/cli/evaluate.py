@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from marl_airhockey.cli.environment import (
-    Environment,
+    EnvironmentOptions,
     as_trained_unless_given,
     in_environment,
 )
@@ -44,7 +44,7 @@ def evaluate_driver(
             "them.",
         ),
     ],
-    environment: Environment,
+    environment: EnvironmentOptions,
     scenario: Scenario = None,
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 200,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = TEST_SEED,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from marl_airhockey.cli import play as cli_play
-from marl_airhockey.cli.environment import TableEnvironment
+from marl_airhockey.cli.environment import TableOptions
 from marl_airhockey.cli.options import console
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.hardware.lab.faults import FAULTS
@@ -78,7 +78,7 @@ def show_demo(host: str, port: int, browser: bool) -> None:
     require("uvicorn", "play")
     from marl_airhockey.play.real_match import RealMatch
 
-    environment = TableEnvironment(lab=True)
+    environment = TableOptions(lab=True)
     with environment.table(environment.keywords) as table:
         match = RealMatch(GAME, {"paddle_0": environment.on_table(PLAYER)}, table)
         match.again = True

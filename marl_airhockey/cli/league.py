@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from marl_airhockey.cli.environment import (
-    Simulation,
+    SimulationOptions,
     as_trained_unless_given,
     in_environment,
 )
@@ -36,7 +36,7 @@ SCRIPTS = (
 @in_environment
 def play_league(
     scenario: Annotated[str, typer.Argument(help="A game of two sides or more.")],
-    environment: Simulation,
+    environment: SimulationOptions,
     players: Annotated[
         list[str] | None,
         typer.Argument(help="Drivers and policies; all scripts if none are given."),

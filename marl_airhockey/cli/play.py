@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from marl_airhockey.cli.environment import (
-    Environment,
+    EnvironmentOptions,
     as_trained_unless_given,
     in_environment,
 )
@@ -63,7 +63,7 @@ Pace = Annotated[
 @in_environment
 def play(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario.")],
-    environment: Environment,
+    environment: EnvironmentOptions,
     opponent: Annotated[
         str | None,
         typer.Option(help="Who sits at all other seats; of the zoo if it has one."),

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 import typer
 
 from marl_airhockey.cli import play as cli_play
-from marl_airhockey.cli.environment import TableEnvironment, in_environment
+from marl_airhockey.cli.environment import TableOptions, in_environment
 from marl_airhockey.cli.progress import waiting
 from marl_airhockey.registry import REAL
 from marl_airhockey.sim.core.errors import require
@@ -20,7 +20,7 @@ from marl_airhockey.sim.core.errors import require
 @in_environment
 def teleop(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario.")],
-    environment: TableEnvironment,
+    environment: TableOptions,
     by: Annotated[
         Literal["mouse", "shadow"],
         typer.Option(help="The page's pointer, or a hand under a camera of its own."),

@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from marl_airhockey.cli.environment import (
-    Environment,
+    EnvironmentOptions,
     as_trained_unless_given,
     in_environment,
 )
@@ -40,7 +40,7 @@ def trials(
             "METHOD (its seeds) are one.",
         ),
     ],
-    environment: Environment,
+    environment: EnvironmentOptions,
     scenario: ScenarioOption = None,
     out: Annotated[
         Path,
@@ -165,7 +165,7 @@ def _play(
     return sheet
 
 
-def _on_table(text: str, environment: Environment) -> str:
+def _on_table(text: str, environment: EnvironmentOptions) -> str:
     """Return METHOD=POLICY with the policy that is for the table."""
     method, equals, policy = text.rpartition("=")
     return method + equals + environment.on_table(policy)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from marl_airhockey.cli import play as cli_play
-from marl_airhockey.cli.environment import Environment, in_environment
+from marl_airhockey.cli.environment import EnvironmentOptions, in_environment
 from marl_airhockey.cli.options import Scenario, console
 from marl_airhockey.data.files import is_recording
 
@@ -22,7 +22,7 @@ def watch(
             help="Name of a driver, path of a policy, or folder of a recording.",
         ),
     ],
-    environment: Environment,
+    environment: EnvironmentOptions,
     scenario: Scenario = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 1,

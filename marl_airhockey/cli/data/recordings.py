@@ -10,7 +10,7 @@ import typer
 from rich.box import SIMPLE
 from rich.table import Table
 
-from marl_airhockey.cli.environment import Environment, in_environment
+from marl_airhockey.cli.environment import EnvironmentOptions, in_environment
 from marl_airhockey.cli.options import AsJson, console
 from marl_airhockey.cli.options import Scenario as ScenarioOption
 from marl_airhockey.cli.progress import bar
@@ -28,7 +28,7 @@ def record(
         str,
         typer.Argument(metavar="DRIVER", help="Name of a driver, or path of a policy."),
     ],
-    environment: Environment,
+    environment: EnvironmentOptions,
     scenario: ScenarioOption = None,
     episodes: Annotated[int, typer.Option(help="Number of episodes.", min=1)] = 100,
     out: Annotated[
