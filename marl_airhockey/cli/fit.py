@@ -115,6 +115,9 @@ def fit_table(
     with waiting("fitting"):
         tracks = [read_track(path, TABLES[table], origin) for path in rows]
         found = fit_corrected(tracks, TABLES[table])
+    if not found.found and base is None:
+        reasons = "; ".join(f"{name}: {why}" for name, why in found.missing.items())
+        raise ValueError(f"nothing of the table could be identified: {reasons}")
     count = sum(len(track.time) for track in tracks)
     what = f"{table}, fitted to {count} rows of play"
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from marl_airhockey.sim.contracts.backend import LiveBackend
 from marl_airhockey.sim.core.limits import VIOLATIONS
 from marl_airhockey.sim.world.step_result import StepResult
 from marl_airhockey.sim.world.world import World
@@ -53,7 +52,7 @@ def info_of(result: StepResult, world: World, i: int, alive: bool) -> dict[str, 
     }
     for name, term in result.terms.items():
         info[_term(name)] = term.item(i)
-    if isinstance(world.backend, LiveBackend):
+    if world.live is not None:
         info["interruption"] = result.interruption
     return info
 

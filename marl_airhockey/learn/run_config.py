@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar
@@ -10,6 +9,7 @@ from typing import Any, ClassVar
 from marl_airhockey.policies.policy import trained_in
 from marl_airhockey.policies.runs import RUN_FORMAT
 from marl_airhockey.registry import DEFAULT_BACKEND
+from marl_airhockey.sim.core.checks import check_fields
 from marl_airhockey.sim.world.keywords import Keywords
 
 
@@ -49,11 +49,9 @@ class RunConfig:
     torch_threads: int = 1
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for f in fields(self):
             value = getattr(self, f.name)
-            expected = _expected(str(f.type), value)
-            if expected:
-                raise ValueError(f"{f.name}: expected {expected}, got {value!r}")
             positive = f.name not in self.MAY_BE_ZERO
             if f.type in ("int", "float") and positive and value <= 0:
                 raise ValueError(f"{f.name}: {value} must be above 0")
@@ -100,22 +98,6 @@ class RunConfig:
             else:
                 lines.append(f"{name} = {_toml(value)}")
         return "\n".join([*lines, *tables]) + "\n"
-
-
-def _expected(kind: str, value: Any) -> str:
-    """Return what a setting of a type must be; "" if its value is that."""
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    number = whole or (isinstance(value, float) and math.isfinite(value))
-    if kind == "float" or (kind == "int" and not number):
-        return "" if number else "a number"
-    if kind == "int":
-        return "" if whole else "a whole number"
-    if kind == "list[int]":
-        fits = isinstance(value, list) and all(not _expected("int", w) for w in value)
-        return "" if fits else "a list of whole numbers"
-    if kind.startswith("dict["):
-        return "" if isinstance(value, dict) else "values by name"
-    return ""
 
 
 def _toml(value: Any) -> str:

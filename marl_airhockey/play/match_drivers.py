@@ -18,7 +18,6 @@ from marl_airhockey.registry import (
     make_scenario,
     zoo_names,
 )
-from marl_airhockey.sim.contracts.backend import LiveBackend
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import GoalScenario
 from marl_airhockey.sim.world.driven_seat import DrivenSeat
@@ -45,7 +44,7 @@ class MatchDrivers:
         self.names = [PERSON for _ in seats]
         """Name or path of the driver of each seat."""
         self._device_kinds = ["mouse" for _ in seats]
-        lag = ARM_LAG if isinstance(world.backend, LiveBackend) else 0.0
+        lag = ARM_LAG if world.live is not None else 0.0
         self._by_kind = {"mouse": f"mouse:lag={lag}", "gamepad": "gamepad"}
         self._devices = [make_driver(self._by_kind["mouse"]) for _ in seats]
         self._driven = [self._build(i) for i in range(len(seats))]
@@ -55,7 +54,7 @@ class MatchDrivers:
         """Names of drivers to choose from: fitting policies, then scripts."""
         known = {name: make_driver(name) for name in independent_driver_names()}
         goal = isinstance(self._world.scenario, GoalScenario)
-        real = isinstance(self._world.backend, LiveBackend)
+        real = self._world.live is not None
         scripts = [
             name
             for name, driver in known.items()
@@ -180,7 +179,7 @@ class MatchDrivers:
             driver = make_driver(name)
             if driver.needs_person and not driver.needs_device:
                 raise ValueError(f"{name} is a person's input device: say {PERSON}")
-            live = isinstance(world.backend, LiveBackend)
+            live = world.live is not None
             refuse_erratic(f"paddle_{i}", driver, live)
             if not (driver.needs_person or driver.needs_device):
                 driver = self.handicap.apply(driver)

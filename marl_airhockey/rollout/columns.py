@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from marl_airhockey.registry import DEFAULT_BACKEND, make_scenario
-from marl_airhockey.sim.contracts.backend import LiveBackend
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.physics import load_physics
 from marl_airhockey.sim.core.recording import Columns, Episode, Recording
@@ -129,7 +128,7 @@ def _sensed(world: World) -> Columns:
         sensed = world.sensed
         columns |= {SENSED + name: getattr(sensed, name) for name in SEEN}
         columns[f"{SENSED}age"] = world.sensor.age
-    if isinstance(world.backend, LiveBackend):
+    if world.live is not None:
         columns[f"{SENSED}visible"] = world.state.visible
     return columns
 
@@ -161,9 +160,9 @@ def _judged(world: World) -> Columns:
 
 def _devices(world: World) -> Columns:
     """Return the numbers that devices of a real table report, (1, ...) each."""
-    if not isinstance(world.backend, LiveBackend):
+    if world.live is None:
         return {}
-    numbers = world.backend.telemetry()
+    numbers = world.live.telemetry()
     return {
         f"device.{name}": np.array([np.nan if value is None else value], np.float64)
         for name, value in numbers.items()

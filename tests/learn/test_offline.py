@@ -147,12 +147,12 @@ def test_a_run_that_was_cut_off_goes_on(expert, tmp_path):
         ({"worlds": 3}, "worlds"),
         ({"seat": 4}, "there is no seat 4"),
         ({"seat": "x"}, "there is no seat 'x'"),
-        ({"hidden": 256}, "hidden: expected a list of whole numbers, got 256"),
-        ({"hidden": [64.5]}, "hidden: expected a list of whole"),
-        ({"batch_size": 32.0}, "batch_size: expected a whole number, got 32.0"),
-        ({"temperature": float("nan")}, "temperature: expected a number, got nan"),
+        ({"hidden": 256}, "hidden: 256; expected a list"),
+        ({"hidden": [64.5]}, r"hidden\[0\]: 64.5; expected a finite whole"),
+        ({"batch_size": 32.0}, "batch_size: 32.0; expected a finite whole number"),
+        ({"temperature": float("nan")}, "temperature: nan; expected a finite number"),
         ({"gamma": 2.0}, "gamma: 2.0 must be"),
-        ({"drivers": 3}, "drivers: expected values by name, got 3"),
+        ({"drivers": 3}, "drivers: 3; expected a dict"),
     ],
 )
 def test_bad_settings_are_named(expert, tmp_path, change, words):

@@ -157,6 +157,14 @@ def test_the_command_writes_physics_that_can_be_played(tmp_path):
     assert played.highest("wall_friction") == pytest.approx(0.2, abs=0.02)
 
 
+def test_a_table_of_which_nothing_is_found_gets_no_file(tmp_path):
+    path, out = tmp_path / "rows.csv", tmp_path / "mine.toml"
+    path.write_text("t,x,y\n" + "".join(f"{k * 0.01},0.1,0\n" for k in range(100)))
+    result = CliRunner().invoke(app, ["fit-table", str(path), "--out", str(out)])
+    assert "nothing of the table could be identified" in str(result.exception)
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(
     ("text", "error"),
     [
@@ -166,6 +174,10 @@ def test_the_command_writes_physics_that_can_be_played(tmp_path):
         (
             "t,x,y\n" + "".join(f"{k * 0.1},0,0\n" for k in range(20)),
             "10 rows a second",
+        ),
+        (
+            "t,x,y\n" + "".join(f"{k * 0.01},{k},0\n" for k in range(20)),
+            r"row 2: the puck at \[2\.0, 0\.0\] m is off the table; .* in metres",
         ),
     ],
 )

@@ -11,6 +11,7 @@ from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON
 from marl_airhockey.play.study.orders import ORDERS
 from marl_airhockey.registry import DEFAULT_BACKEND, runs_code
+from marl_airhockey.sim.core.checks import check_fields
 
 EXAMPLE = Path(__file__).parent / "example.toml"
 """Example of a plan's file."""
@@ -39,6 +40,7 @@ class Question:
     """True for one that is answered in words, or not at all."""
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if not re.fullmatch(r"[a-z0-9_]+", self.id):
             raise ValueError(f"id: {self.id!r} must be of a-z, 0-9 and _")
         if len(self.choices) == 1:
@@ -102,6 +104,7 @@ class Opponent:
     handicap: Handicap = field(default_factory=Handicap)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.name == PERSON and self.handicap != Handicap():
             raise ValueError("a plan cannot give a person a handicap")
         refuse_code(self.name)
@@ -154,15 +157,15 @@ class Plan:
     """Digest of the plan's file, first 12 hexadecimal digits of SHA-256."""
 
     def __post_init__(self) -> None:
+        check_fields(self, games=(1, 1000), practice=(0, 1000), rest=(0, 86_400))
         refuse_code(self.scenario)
         if self.order not in ORDERS:
             known = ", ".join(ORDERS)
             raise ValueError(f"order: {self.order!r} is unknown; there are {known}")
         if not self.agree:
             raise ValueError("agree: participants must have a line to agree to")
-        for name, least in (("games", 1), ("practice", 0), ("rest", 0), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name}: must be at least {least}")
+        if self.seed < 0:
+            raise ValueError(f"seed: {self.seed} must be at least 0")
         for name, keys in (
             ("opponents", [opponent.label for opponent in self.opponents]),
             ("questions", [question.id for question in self.questions]),

@@ -69,6 +69,8 @@ def check_fields(made: Any, **ranges: Range) -> None:
 
 
 def _check(name: str, value: Any, hint: Any, bounds: Range | None) -> None:
+    if hint is Any:
+        return
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
         if value is None and type(None) in inner:
@@ -153,7 +155,7 @@ def _value(given: Any, hint: Any, where: str) -> Any:
     if get_origin(hint) in (Union, types.UnionType):
         hint = next(kind for kind in inner if kind is not type(None))
         return None if given is None else _value(given, hint, where)
-    if is_dataclass(hint):
+    if is_dataclass(hint) and not isinstance(given, hint):  # type: ignore[arg-type]
         return build(hint, given, where)  # type: ignore[arg-type]
     if get_origin(hint) is tuple and isinstance(given, list):
         parts = [inner[0]] * len(given) if inner[-1] is Ellipsis else [*inner]

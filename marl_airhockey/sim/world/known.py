@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,7 @@ from marl_airhockey.sim.core.state import State
 from marl_airhockey.types import Array, Memory
 
 
-@dataclass(frozen=True)
-class Known:
+class Known(NamedTuple):
     """What the seats of B worlds know at a moment, see `World.known`.
 
     All that chooses actions takes this object, so that a driver observes the same in an

@@ -83,7 +83,10 @@ class World(WorldSpaces):
         self._limit = np.full(b, check_count("max_cycles", cycles))
         self.open = np.array([s for s in seats if s not in drivers], np.int64)
         self.reach = ReachPlanes.of(scene.table, scene.seats)
-        sight = backend.sight if isinstance(backend, LiveBackend) else None
+        # Here, once: `isinstance` of an abstract class is slow.
+        self.live = live = backend if isinstance(backend, LiveBackend) else None
+        """Backend of a real table; None in simulation"""
+        sight = live.sight if live is not None else None
         self.sensor = Sensor(scene, b, physics, dt, Needs.of(forms), sight)
         self.observer = Observer(scenario, self.sensor, physics, forms)
         self.driven = [
@@ -272,9 +275,9 @@ class World(WorldSpaces):
     def reset_worlds(self, worlds: Array) -> None:
         """Begin a new episode in some worlds, by index (W,)."""
         rng = self.draw_worlds(worlds)
-        if isinstance(self.backend, LiveBackend):
+        if self.live is not None:
             # All is compiled now, so that no time is lost once the puck moves.
-            state = self.backend.arrange(self._state)
+            state = self.live.arrange(self._state)
             memory = self.scenario.initial_memory(state, rng)
             self._begin(worlds, state, self._aimed(rng, state, memory, worlds))
         for seat in self.driven:
@@ -437,8 +440,8 @@ class World(WorldSpaces):
         moment = step()
         self._adopt(moment)
         result = StepResult.of(moment, self.open if self.driven else None)
-        if isinstance(self.backend, LiveBackend) and self.backend.interruption:
-            result.interruption = self.backend.interruption
+        if self.live is not None and self.live.interruption:
+            result.interruption = self.live.interruption
             result.truncated[:] = True
         self._observe(moment, result)
         if self.autoreset:
