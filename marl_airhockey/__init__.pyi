@@ -19,7 +19,7 @@ from .registry import driver_names as driver_names
 from .registry import make_driver as make_driver
 from .registry import make_scenario as make_scenario
 from .registry import scenario_names as scenario_names
-from .rollout.rollout import rollout as rollout
+from .rollouts.rollout import rollout as rollout
 
 __version__: str
 

@@ -209,7 +209,7 @@ FAULTS = [
     ),
     Fault(
         "last step is not recorded",
-        "marl_airhockey/rollout/collector.py",
+        "marl_airhockey/rollouts/collector.py",
         "value[i, :length] for",
         "value[i, : length - 1] for",
         "data/test_record.py",

@@ -2,6 +2,9 @@
 
 import subprocess
 import sys
+from pathlib import Path
+
+import cloudpickle
 
 import marl_airhockey as ah
 from marl_airhockey import discovery
@@ -29,6 +32,14 @@ def test_every_public_name_is_there_and_no_other():
         assert getattr(ah, name).__name__ == name
     modules = {name for name in vars(ah) if not name.startswith("_")} - listed
     assert all(f"marl_airhockey.{name}" in sys.modules for name in modules), modules
+
+
+def test_functions_that_use_the_package_can_be_sent_to_other_processes():
+    """SubprocVecEnv, Ray and joblib pickle functions together with what they name."""
+    assert cloudpickle.loads(cloudpickle.dumps(ah)) is ah
+    # A public name that is a package's, too, would be one or the other.
+    packages = {p.stem for p in Path(ah.__file__).parent.iterdir()}
+    assert not packages & set(ah.__all__)
 
 
 def test_versions_are_read_without_an_import_and_are_those_of_the_classes():

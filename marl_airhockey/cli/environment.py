@@ -28,7 +28,7 @@ from marl_airhockey.cli.options import (
 )
 from marl_airhockey.cli.progress import errors, waiting
 from marl_airhockey.registry import DEFAULT_BACKEND, REAL, make_driver, zoo_names
-from marl_airhockey.rollout.as_trained import (
+from marl_airhockey.rollouts.as_trained import (
     as_trained,
     describe_environment,
     seen_in,

@@ -25,7 +25,7 @@ from marl_airhockey.registry import (
     scenario_names,
     zoo_names,
 )
-from marl_airhockey.rollout.as_trained import as_trained
+from marl_airhockey.rollouts.as_trained import as_trained
 from marl_airhockey.sim.core.errors import unknown_name
 from marl_airhockey.sim.jit import shipped
 from marl_airhockey.sim.jit.cache import used

@@ -41,7 +41,7 @@ def watch(
 
     --host, --port and --browser are those of a recording's page.
     """
-    from marl_airhockey.rollout.watch import show_episodes
+    from marl_airhockey.rollouts.watch import show_episodes
 
     if is_recording(Path(name)):
         if video is None:
@@ -61,8 +61,8 @@ def watch(
 def watch_recording(recording: Path, video: Path) -> None:
     """Write a video of a recording and print its size."""
     from marl_airhockey.play.replay import one_episode
-    from marl_airhockey.rollout.replay import Replay
-    from marl_airhockey.rollout.watch import write_replay
+    from marl_airhockey.rollouts.replay import Replay
+    from marl_airhockey.rollouts.watch import write_replay
 
     write_replay(Replay(one_episode(recording)), video)
     console.print(f"wrote {video} ({video.stat().st_size // 1000} kB)")

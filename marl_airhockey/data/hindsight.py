@@ -16,7 +16,7 @@ from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches, new_head
 from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.registry import has_goals, make_scenario
-from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.sim.contracts.scenario import GoalScenario
 from marl_airhockey.sim.core.recording import PLAYED, Columns, Episode, Recording
 from marl_airhockey.types import Array

@@ -13,14 +13,14 @@ from marl_airhockey.data.film import film_columns
 from marl_airhockey.data.writer import RecordingWriter, whole_recording
 from marl_airhockey.hardware.camera import Film
 from marl_airhockey.registry import DEFAULT_BACKEND, is_live
-from marl_airhockey.rollout.columns import (
+from marl_airhockey.rollouts.columns import (
     episode_notes,
     first_columns,
     head_of,
     step_columns,
 )
-from marl_airhockey.rollout.play import play
-from marl_airhockey.rollout.rollout import AT_ONCE, play_episodes
+from marl_airhockey.rollouts.play import play
+from marl_airhockey.rollouts.rollout import AT_ONCE, play_episodes
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.recording import FILM, PLAYED, Columns

@@ -11,9 +11,9 @@ from typing import Any
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.writer import whole_recording
 from marl_airhockey.registry import make_scenario, scenario_names
-from marl_airhockey.rollout.columns import SHARED
-from marl_airhockey.rollout.replay import Replay
-from marl_airhockey.rollout.rollout import AT_ONCE
+from marl_airhockey.rollouts.columns import SHARED
+from marl_airhockey.rollouts.replay import Replay
+from marl_airhockey.rollouts.rollout import AT_ONCE
 from marl_airhockey.sim.core.recording import PLAYED, Episode, Recording
 
 LEFT_OUT = ("columns", "format", "observation_labels", *SHARED)

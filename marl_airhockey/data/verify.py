@@ -9,7 +9,7 @@ import numpy as np
 from marl_airhockey.data.reader import episodes_of, read_head
 from marl_airhockey.data.relabel import batches
 from marl_airhockey.registry import DEFAULT_BACKEND, is_live
-from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.sim.core.recording import Columns, Recording
 from marl_airhockey.types import Array
 

@@ -11,7 +11,7 @@ import numpy as np
 from marl_airhockey.build import scenario_of
 from marl_airhockey.evaluation.evaluate import TEST_SEED, evaluate
 from marl_airhockey.evaluation.stats import bootstrap
-from marl_airhockey.rollout.as_trained import seated_players
+from marl_airhockey.rollouts.as_trained import seated_players
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 

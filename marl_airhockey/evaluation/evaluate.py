@@ -18,9 +18,9 @@ from marl_airhockey.evaluation.deployability import Deployability
 from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import bootstrap, interval, iqm, without_nan
 from marl_airhockey.registry import DEFAULT_BACKEND, is_live, make_driver
-from marl_airhockey.rollout.as_trained import as_trained, seen_in
-from marl_airhockey.rollout.columns import head_of
-from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.rollouts.as_trained import as_trained, seen_in
+from marl_airhockey.rollouts.columns import head_of
+from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count, check_seed

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from marl_airhockey.build import build_world, scenario_of
-from marl_airhockey.rollout.play import play
+from marl_airhockey.rollouts.play import play
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.sim.world.roster import Roster

@@ -14,7 +14,7 @@ from marl_airhockey.evaluation.games import GameResults, play_games, teams_of
 from marl_airhockey.evaluation.standings import Standings
 from marl_airhockey.evaluation.stats import elo
 from marl_airhockey.policies.runs import policies_of
-from marl_airhockey.rollout.as_trained import seated_players
+from marl_airhockey.rollouts.as_trained import seated_players
 from marl_airhockey.sim.world.keywords import Keywords
 from marl_airhockey.types import Array
 

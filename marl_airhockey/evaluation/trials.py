@@ -17,7 +17,7 @@ import numpy as np
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.measures import COLUMNS, measure
 from marl_airhockey.evaluation.trial_sheet import TrialRow, TrialSheet
-from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.core.state import State
 from marl_airhockey.sim.world.driven_seat import DrivenSeat

@@ -10,7 +10,7 @@ from typing import Any
 from marl_airhockey.data.reader import read_head, read_recording
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.measures import Player, measure
-from marl_airhockey.rollout.columns import scenario_of
+from marl_airhockey.rollouts.columns import scenario_of
 from marl_airhockey.sim.core.recording import META, PLAYED, Episode, Recording
 from marl_airhockey.sim.core.scene import Scene
 

@@ -11,7 +11,7 @@ from marl_airhockey.build import build_world
 from marl_airhockey.play.handicap import Handicap
 from marl_airhockey.play.match_drivers import PERSON, MatchDrivers
 from marl_airhockey.play.messages import description, drawn, events
-from marl_airhockey.rollout.columns import first_columns
+from marl_airhockey.rollouts.columns import first_columns
 from marl_airhockey.sim.contracts.observable import OBSERVE
 from marl_airhockey.sim.core.recording import Columns
 from marl_airhockey.sim.core.seat import Seat

@@ -22,7 +22,7 @@ from marl_airhockey.data.parquet import EXTRA, warm_up
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.hardware.camera import Camera, Film
 from marl_airhockey.play.live_match import LiveMatch
-from marl_airhockey.rollout.columns import episode_notes, head_of, step_columns
+from marl_airhockey.rollouts.columns import episode_notes, head_of, step_columns
 from marl_airhockey.sim.core.errors import require
 from marl_airhockey.sim.core.recording import FILM, Columns
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.play.messages import description, drawn, events
-from marl_airhockey.rollout.columns import memories_of, scenario_of, states_of
+from marl_airhockey.rollouts.columns import memories_of, scenario_of, states_of
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.recording import Episode, Recording
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from marl_airhockey.build import build_driven_world
 from marl_airhockey.data.reader import read_recording
-from marl_airhockey.rollout.columns import scenario_of
-from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.rollouts.columns import scenario_of
+from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.core.recording import Columns
 from marl_airhockey.sim.core.scene import Scene

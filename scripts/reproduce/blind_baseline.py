@@ -30,7 +30,7 @@ from marl_airhockey.cli.options import settings
 from marl_airhockey.evaluation.evaluate import TEST_SEED
 from marl_airhockey.evaluation.measures import COLUMNS, EpisodeStatistics
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.driver import Driver, View
 from marl_airhockey.types import Array
 

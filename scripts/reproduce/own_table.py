@@ -41,7 +41,7 @@ from marl_airhockey.hardware.lab.world import LabWorld
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.train import run_training
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.core.physics import SIMULATED
 from marl_airhockey.sim.core.profiles import find_profile
 from marl_airhockey.sim.world.keywords import Keywords

@@ -13,7 +13,7 @@ import numpy as np
 import typer
 
 import marl_airhockey as ah
-from marl_airhockey.rollout.play import play
+from marl_airhockey.rollouts.play import play
 from marl_airhockey.sim.render.picture import draw
 from marl_airhockey.sim.render.renderer import Renderer
 from marl_airhockey.types import Array

@@ -19,7 +19,7 @@ from rich.table import Table
 
 import marl_airhockey as ah
 from marl_airhockey.evaluation.stats import interval
-from marl_airhockey.rollout import play as episodes
+from marl_airhockey.rollouts import play as episodes
 
 HOME, FAR = (
     ["allround", "striker", "allround"],

@@ -31,7 +31,7 @@ from marl_airhockey.hardware.lab.emulated_robot import EmulatedRobot
 from marl_airhockey.hardware.lab.setup import LabSetup
 from marl_airhockey.hardware.robot import PRESETS, DriverState, Preset, Smoothing
 from marl_airhockey.policies.load import load_policy
-from marl_airhockey.rollout import play as episodes_of
+from marl_airhockey.rollouts import play as episodes_of
 from marl_airhockey.sim.contracts.driver import Driver, PrescribedMotion, View
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.seat import Seat

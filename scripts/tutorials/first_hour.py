@@ -19,8 +19,8 @@ import marl_airhockey as ah
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.play.replay import one_episode
-from marl_airhockey.rollout.replay import Replay
-from marl_airhockey.rollout.watch import write_replay
+from marl_airhockey.rollouts.replay import Replay
+from marl_airhockey.rollouts.watch import write_replay
 
 
 def look() -> None:

@@ -7,7 +7,7 @@ from marl_airhockey.data.hindsight import ACHIEVED, DESIRED, with_hindsight
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.registry import make_driver
-from marl_airhockey.rollout.columns import scenario_of
+from marl_airhockey.rollouts.columns import scenario_of
 
 
 def recorded(folder, scenario, driver, episodes=8, **keywords):

@@ -13,7 +13,7 @@ from marl_airhockey.data.files import recordings_in
 from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.summary import summarize_recording
-from marl_airhockey.rollout.columns import memories_of, scenario_of, states_of
+from marl_airhockey.rollouts.columns import memories_of, scenario_of, states_of
 
 
 def record(tmp_path, agent, scenario, episodes=3, **keywords):

@@ -17,8 +17,8 @@ from marl_airhockey.play.protocol import RateLimiter
 from marl_airhockey.play.recorder import Recorder
 from marl_airhockey.play.replay import one_episode, replay_of
 from marl_airhockey.play.report import summarize
-from marl_airhockey.rollout.replay import Replay
-from marl_airhockey.rollout.watch import write_replay
+from marl_airhockey.rollouts.replay import Replay
+from marl_airhockey.rollouts.watch import write_replay
 
 DEVICE = {"input": "mouse", "width": 1000, "height": 600, "density": 2.0, "hz": 60.0}
 

@@ -24,7 +24,7 @@ import marl_airhockey as ah
 from marl_airhockey.discovery import gymnasium_id
 from marl_airhockey.envs.meanings import term_meanings
 from marl_airhockey.evaluation.evaluate import evaluate
-from marl_airhockey.rollout.rollout import play_episodes
+from marl_airhockey.rollouts.rollout import play_episodes
 from marl_airhockey.sim.contracts.scenario import Scenario, Transition
 from marl_airhockey.sim.core.state import ARRAYS
 

@@ -12,7 +12,7 @@ from marl_airhockey.data.exchange.measured_events import Path, fill_events
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.writer import RecordingWriter
 from marl_airhockey.registry import REAL, make_scenario
-from marl_airhockey.rollout.columns import SENSED, STATE, scenario_of
+from marl_airhockey.rollouts.columns import SENSED, STATE, scenario_of
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.physics import Physics
 from marl_airhockey.sim.core.recording import Columns, Recording

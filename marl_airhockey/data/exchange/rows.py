@@ -28,7 +28,7 @@ from marl_airhockey.data.exchange.seats import (
 from marl_airhockey.data.exchange.settings import ImportSettings
 from marl_airhockey.data.files import named_folder, shared_head, whole_folder
 from marl_airhockey.data.writer import whole_recording
-from marl_airhockey.rollout.columns import SENSED, STATE
+from marl_airhockey.rollouts.columns import SENSED, STATE
 from marl_airhockey.sim.core.recording import PLAYED, Columns, Episode
 from marl_airhockey.types import Array
 

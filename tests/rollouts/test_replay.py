@@ -13,7 +13,7 @@ from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.data.relabel import fitting, relabelled
 from marl_airhockey.data.verify import EXACT, distance, replay_differences
-from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.sim.core.recording import Recording
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
-from marl_airhockey.rollout.columns import episode_notes, first_columns, step_columns
+from marl_airhockey.rollouts.columns import episode_notes, first_columns, step_columns
 from marl_airhockey.sim.core.recording import Columns, Episode
 from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array

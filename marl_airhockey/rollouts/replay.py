@@ -15,8 +15,8 @@ from typing import ClassVar
 import numpy as np
 
 from marl_airhockey.registry import DEFAULT_BACKEND, find_backend
-from marl_airhockey.rollout.collector import Collector
-from marl_airhockey.rollout.columns import (
+from marl_airhockey.rollouts.collector import Collector
+from marl_airhockey.rollouts.columns import (
     JUDGED,
     PATH,
     STATE,

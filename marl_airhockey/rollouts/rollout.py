@@ -9,10 +9,10 @@ import numpy as np
 
 from marl_airhockey.build import build_driven_world, table_keywords
 from marl_airhockey.registry import DEFAULT_BACKEND, is_live, make_driver
-from marl_airhockey.rollout.as_trained import as_trained, seen_in
-from marl_airhockey.rollout.collector import Collector
-from marl_airhockey.rollout.columns import step_columns
-from marl_airhockey.rollout.play import play
+from marl_airhockey.rollouts.as_trained import as_trained, seen_in
+from marl_airhockey.rollouts.collector import Collector
+from marl_airhockey.rollouts.columns import step_columns
+from marl_airhockey.rollouts.play import play
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.core.checks import check_count, check_seed
 from marl_airhockey.sim.core.errors import unknown_name

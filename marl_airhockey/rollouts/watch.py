@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 
 from marl_airhockey.build import build_driven_world
-from marl_airhockey.rollout.play import play
-from marl_airhockey.rollout.replay import Replay
+from marl_airhockey.rollouts.play import play
+from marl_airhockey.rollouts.replay import Replay
 from marl_airhockey.sim.contracts.driver import Driver
 from marl_airhockey.sim.contracts.scenario import Scenario
 from marl_airhockey.sim.render.renderer import TOP, Renderer

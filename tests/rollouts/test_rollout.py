@@ -13,7 +13,7 @@ from marl_airhockey.data.reader import read_recording
 from marl_airhockey.data.record import record_episodes
 from marl_airhockey.evaluation.evaluate import evaluate_recording
 from marl_airhockey.evaluation.measures import measure
-from marl_airhockey.rollout.rollout import AT_ONCE
+from marl_airhockey.rollouts.rollout import AT_ONCE
 
 PROFILES = "ideal", "ur5e"
 OTHER, SHORT = {"paddle_1": "striker"}, {"max_cycles": 20}

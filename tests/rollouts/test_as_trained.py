@@ -9,7 +9,7 @@ from runs import SMALL
 
 import marl_airhockey as ah
 from marl_airhockey.registry import make_driver
-from marl_airhockey.rollout.as_trained import as_trained, describe_environment
+from marl_airhockey.rollouts.as_trained import as_trained, describe_environment
 
 GENTLE = """
 from dataclasses import dataclass
