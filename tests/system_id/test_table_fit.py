@@ -130,10 +130,10 @@ def test_a_profile_of_a_table_is_written_and_played(tmp_path):
     [
         ("base = 'moon'", "base 'moon'"),
         ("[ranges]\nglue = [0, 1]", "parameter 'glue'"),
-        ("[ranges]\ntilt = 3", r"tilt: expected \[low, high\]"),
-        ("[ranges]\nwall_restitution = [0.5, 1.5]", "is no range within"),
-        ("[ranges]\nwall_restitution = [0.9, 0.5]", "is no range within"),
-        ("rangs = 1", "key 'rangs'"),
+        ("[ranges]\ntilt = '3'", r"tilt: expected a number or \(low, high\)"),
+        ("[ranges]\nwall_restitution = [0.5, 1.5]", "must lie within"),
+        ("[ranges]\nwall_restitution = [0.9, 0.5]", "must lie within"),
+        ("rangs = 1", "field 'rangs'"),
         ("= 1", "Invalid"),
     ],
 )

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
+
+from marl_airhockey.sim.core.errors import unknown_name
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,34 @@ PARAMETERS: dict[str, Parameter] = {
     "arm_payload": Parameter(0.0, 0.0, 1.0, "kg", "unknown to the arm", arms=True),
 }
 """Physical parameters by name."""
+
+
+def parameter_range(name: str, value: Any, where: str) -> tuple[float, float]:
+    """Return the range of a parameter that a user gives as a number or as its ends.
+
+    Args:
+        name: name of the parameter.
+        value: a number, or (low, high).
+        where: place of the value, for messages.
+
+    Raises:
+        ValueError: an unknown name, no numbers, or numbers outside the bounds.
+    """
+    if name not in PARAMETERS:
+        raise ValueError(unknown_name("physical parameter", name, PARAMETERS))
+    parameter = PARAMETERS[name]
+    pair = value if isinstance(value, (tuple, list)) else (value, value)
+    numbers = [v for v in pair if isinstance(v, Real) and not isinstance(v, bool)]
+    if len(pair) != 2 or len(numbers) != 2:
+        raise ValueError(f"{where}: expected a number or (low, high), got {value!r}")
+    low, high = map(float, numbers)
+    if not parameter.low <= low <= high <= parameter.high:
+        raise ValueError(
+            f"{where}: {value!r} must lie within {parameter.low} .. "
+            f"{parameter.high} {parameter.unit}".rstrip(" 1")
+            + (", the lower end first" if low != high else "")
+        )
+    return low, high
 
 
 LAWS = (

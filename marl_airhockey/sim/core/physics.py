@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from marl_airhockey.sim.core.errors import unknown_name
-from marl_airhockey.sim.core.parameters import PARAMETERS, PRESETS, SCATTER
+from marl_airhockey.sim.core.parameters import (
+    PARAMETERS,
+    PRESETS,
+    SCATTER,
+    parameter_range,
+)
 from marl_airhockey.sim.core.profiles import CorrelatedParameter, find_profile
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.types import Array
-
-Value = float | tuple[float, float]
-"""Fixed value of a parameter, or its range ``(low, high)``."""
 
 Given = str | Path | Mapping[str, Any]
 """Physics as users give it: the name of a preset, a TOML file, or values and ranges by
@@ -89,7 +90,7 @@ class Physics:
         self._sloping = [n for n in ("tilt", "cross_tilt") if n not in fixed]
         """Tilts that a slope in any direction adds to: those that nobody has given"""
         for name, value in values.items():
-            pair = _checked(name, value)
+            pair = parameter_range(name, value, f"physics[{name!r}]")
             if name not in self.ranges:
                 raise ValueError(
                     f"physics[{name!r}] is of arms, and this backend has none: "
@@ -135,26 +136,6 @@ class Physics:
         """True if any parameter is drawn per episode."""
         ranges = self.ranges.values()
         return self.any_of("slope") or any(low != high for low, high in ranges)
-
-
-def _checked(name: str, value: Value) -> tuple[float, float]:
-    if name not in PARAMETERS:
-        raise ValueError(unknown_name("physical parameter", name, PARAMETERS))
-    parameter = PARAMETERS[name]
-    pair = value if isinstance(value, (tuple, list)) else (value, value)
-    numbers = [v for v in pair if isinstance(v, Real) and not isinstance(v, bool)]
-    if len(pair) != 2 or len(numbers) != 2:
-        raise ValueError(
-            f"physics[{name!r}]: expected a number or (low, high), got {value!r}"
-        )
-    low, high = map(float, numbers)
-    if not parameter.low <= low <= high <= parameter.high:
-        raise ValueError(
-            f"physics[{name!r}]: {value!r} must lie within {parameter.low} .. "
-            f"{parameter.high} {parameter.unit}".rstrip(" 1")
-            + (", the lower end first" if low != high else "")
-        )
-    return low, high
 
 
 def _preset(name: object) -> dict[str, float]:

@@ -11,11 +11,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from marl_airhockey.sim.core.checks import build, check_fields
 from marl_airhockey.sim.core.errors import unknown_name
-from marl_airhockey.sim.core.parameters import PARAMETERS
+from marl_airhockey.sim.core.parameters import parameter_range
 from marl_airhockey.types import Array
 
 Range = tuple[float, float]
@@ -181,6 +183,20 @@ def find_profile(name: str) -> Profile:
     raise ValueError(unknown_name("profile", name, PROFILES))
 
 
+@dataclass(frozen=True)
+class _ProfileFile:
+    """Content of a profile's file."""
+
+    base: str = "ideal"
+    what: str = ""
+    ranges: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.base not in PROFILES:
+            raise ValueError(unknown_name("base", self.base, PROFILES))
+
+
 def load_profile(path: Path) -> Profile:
     """Read a profile from a TOML file, such as ``airhockey fit-table`` writes.
 
@@ -191,39 +207,17 @@ def load_profile(path: Path) -> Profile:
         given = tomllib.loads(path.read_text())
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"profile {path}: {error}") from error
-    known = {"base", "what", "ranges"}
-    for name in given.keys() - known:
-        raise ValueError(f"profile {path}: {unknown_name('key', name, known)}")
     if not given:
         raise ValueError(f"profile {path}: there is nothing in the file")
-    base_name, ranges = given.get("base", "ideal"), given.get("ranges", {})
-    if not isinstance(ranges, dict):
-        raise ValueError(
-            f"profile {path}: ranges: {ranges!r}; expected a table, [ranges], of "
-            "name = [low, high]"
-        )
-    if base_name not in PROFILES:
-        raise ValueError(
-            f"profile {path}: {unknown_name('base', str(base_name), PROFILES)}"
-        )
-    for name, pair in ranges.items():
-        if name not in PARAMETERS:
-            raise ValueError(
-                f"profile {path}: {unknown_name('parameter', name, PARAMETERS)}"
-            )
-        numbers = isinstance(pair, list) and len(pair) == 2
-        if not numbers or not all(type(x) in (int, float) for x in pair):
-            raise ValueError(f"profile {path}: {name}: expected [low, high]")
-        low, high, bounds = pair[0], pair[1], PARAMETERS[name]
-        if not bounds.low <= low <= high <= bounds.high:
-            raise ValueError(
-                f"profile {path}: {name}: {pair} is no range within {bounds.low} .. "
-                f"{bounds.high}"
-            )
-    base = PROFILES[base_name]
+    try:
+        file = build(_ProfileFile, given)
+        ranges = {k: parameter_range(k, v, k) for k, v in file.ranges.items()}
+    except ValueError as error:
+        raise ValueError(f"profile {path}: {error}") from error
+    base = PROFILES[file.base]
     return Profile(
-        str(given.get("what", path.stem)),
-        {**base.ranges, **{k: (float(a), float(b)) for k, (a, b) in ranges.items()}},
+        file.what or path.stem,
+        {**base.ranges, **ranges},
         {k: v for k, v in base.shares.items() if k not in ranges},
         {k: v for k, v in base.follows.items() if k not in ranges},
     )
