@@ -15,7 +15,7 @@ from marl_airhockey.learn.run import ProgressCallback
 from marl_airhockey.learn.train import run_training, versions
 from marl_airhockey.policies.load import load_policy
 from marl_airhockey.registry import make_driver
-from marl_airhockey.rollout.watch import show_episodes
+from marl_airhockey.rollouts.watch import show_episodes
 
 BESIDE = ("still", "random", "striker")
 """Agents that the learned policy is compared with"""

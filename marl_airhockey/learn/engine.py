@@ -13,14 +13,18 @@ import torch
 
 from marl_airhockey.build import compile_world
 from marl_airhockey.envs.slots import SlotEnv
-from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.evaluate_policy import (
+    DriverFactory,
+    Metrics,
+    evaluate_policy,
+)
 from marl_airhockey.learn.logs import Log
 from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.learn.self_play import SelfPlayEnv
+from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
-from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.registry import find_backend
 
 
@@ -75,6 +79,26 @@ def end_setup(run: TrainingRun[PPOConfig]) -> None:
     run.end_setup()
 
 
+SUFFIXES = {"torch": ".pt", "sb3": ".zip"}
+"""Ends of the files of weights, by engine"""
+
+
+def initial_weights(config: PPOConfig) -> Path:
+    """Return the file of the weights that a run begins with, the best if there are two.
+
+    Raises:
+        ValueError: `init` is no run of the same engine, or one of another format.
+    """
+    run, engine = Path(config.init), config.engine
+    if (run / "config.toml").exists():
+        load_config(PPOConfig, run / "config.toml")
+    files = [run / f"{name}{SUFFIXES[engine]}" for name in ("best", "last")]
+    path = next((file for file in files if file.exists()), None)
+    if path is None:
+        raise ValueError(f"init: {run} is no folder of a run of the engine {engine}")
+    return path
+
+
 def other_size(path: Path, error: RuntimeError) -> ValueError:
     """Return the error for weights that do not fit the network of a run."""
     return ValueError(
@@ -100,7 +124,7 @@ def note_step(log: Log, env: SlotEnv) -> None:
 
 def evaluate_and_record(
     run: TrainingRun[RunConfig],
-    policy: NumpyPolicy,
+    make: DriverFactory,
     log: Log,
     save: Callable[[str], None],
 ) -> Metrics:
@@ -108,13 +132,11 @@ def evaluate_and_record(
 
     Args:
         run: whose folder is kept up to date.
-        policy: as it is now.
+        make: maker of the policy as a driver, as it is now.
         log: log of the run.
         save: writes it under a name, "best" or "last".
     """
-    metrics = evaluate_policy(
-        lambda mean: policy_driver(policy, "training", mean), run.config
-    )
+    metrics = evaluate_policy(make, run.config)
     for name, value in metrics.items():
         log.record(f"eval/{name}", value)
     return run.record_evaluation(metrics, save)

@@ -19,6 +19,12 @@ class Log(Protocol):
     def record_mean(self, key: str, value: float) -> None:
         """Add a value to a mean of the next row."""
 
+    def dump(self, step: int) -> None:
+        """Write the next row, at some steps of the run."""
+
+    def close(self) -> None:
+        """Close the files."""
+
 
 def progress_path(folder: Path, steps: int) -> Path:
     """Return the path of a run's CSV log; a resumed run begins another one.
@@ -55,13 +61,13 @@ class RunLog:
         total, count = self._sums[key]
         self._sums[key] = total + value, count + 1
 
-    def dump(self, steps: int) -> None:
+    def dump(self, step: int) -> None:
         """Write the next row, at some steps of the run, to both."""
         means = {key: total / count for key, (total, count) in self._sums.items()}
-        row = {"steps": steps, **dict(sorted({**self._values, **means}.items()))}
+        row = {"steps": step, **dict(sorted({**self._values, **means}.items()))}
         for key, value in row.items():
             if key != "steps":
-                self._events.add_scalar(key, value, steps)
+                self._events.add_scalar(key, value, step)
         self._write(row)
         self._values.clear()
         self._sums.clear()

@@ -8,6 +8,7 @@ What is left out is what surrounds it there, which costs a third of the CPU time
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
     evaluate_and_record,
+    initial_weights,
     load_state,
     note_step,
     other_size,
@@ -31,8 +33,8 @@ from marl_airhockey.learn.networks import ActorCritic
 from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.self_play import SelfPlayEnv, make_training_env
-from marl_airhockey.learn.settings import load_config
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import policy_driver
 
 VALUE_WEIGHT = 0.5
 """Weight of the critic's squared error in the loss."""
@@ -109,7 +111,7 @@ class Trainer:
         if run.progress.steps:
             self._load(run.folder / "last.pt", whole=True)
         elif config.init:
-            self._begin_with(Path(config.init))
+            self._load(initial_weights(config), whole=False)
         self._widen([])
         # A resumed run must not repeat the episodes of its beginning.
         self._env.seed(config.seed * 10_000 + run.progress.steps % 9973)
@@ -257,7 +259,8 @@ class Trainer:
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the evaluation's row."""
         run, policy = self._run, self._policy()
-        row = evaluate_and_record(run, policy, self._log, self._save)
+        make = partial(policy_driver, policy, "training")
+        row = evaluate_and_record(run, make, self._log, self._save)
         if run.config.self_play:
             policy.save(run.checkpoint_path)
         return row
@@ -266,20 +269,6 @@ class Trainer:
         """Write the policy, and all that it goes on from, under a name."""
         parts = self.model, self._optimizer, self._policy()
         save_weights(self._run.folder, name, *parts)
-
-    def _begin_with(self, run: Path) -> None:
-        """Take the weights of a run, of its best policy if there is one.
-
-        Raises:
-            ValueError: no run of this engine, one of another format or size.
-        """
-        if (run / "config.toml").exists():
-            load_config(PPOConfig, run / "config.toml")
-        files = [run / f"{name}.pt" for name in ("best", "last")]
-        path = next((file for file in files if file.exists()), None)
-        if path is None:
-            raise ValueError(f"init: {run} is no folder of a run of the engine torch")
-        self._load(path, whole=False)
 
     def _load(self, path: Path, whole: bool) -> None:
         """Read weights, and for the same run the optimizer; no code in it is run."""

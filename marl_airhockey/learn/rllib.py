@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import ray
@@ -21,7 +22,9 @@ from ray.rllib.core import DEFAULT_MODULE_ID
 from ray.rllib.core.rl_module.rl_module import RLModuleSpec
 
 from marl_airhockey.envs.slots import SlotEnv
-from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.engine import evaluate_and_record
+from marl_airhockey.learn.evaluate_policy import Metrics
+from marl_airhockey.learn.logs import RunLog
 from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.rllib_runner import RUNNER_CPU, BatchRunner, PolicyModule
 from marl_airhockey.learn.run import TrainingRun
@@ -125,29 +128,26 @@ def train_with_rllib(run: TrainingRun[PPOConfig]) -> Metrics:
     def save(name: str) -> None:
         policy().save(folder / f"{name}.npz")
 
+    def advance() -> tuple[int, float]:
+        sampled = algo.train().get("env_runners", {})
+        if config.num_env_runners:  # Other processes, whose time is not of this one.
+            progress.learning_cpu_seconds += float(sampled.get(RUNNER_CPU, 0.0))
+        steps = int(sampled.get("num_env_steps_sampled", 0))
+        return progress.steps + steps, config.learning_rate
+
     def evaluate() -> Metrics:
-        now = policy()
-        metrics = evaluate_policy(
-            lambda mean: policy_driver(now, "training", mean), config
-        )
-        older = list(folder.glob("rllib-*"))
+        now, older = policy(), list(folder.glob("rllib-*"))
         algo.save_to_path(_algorithm_state(run))
-        row = run.record_evaluation(metrics, save)
+        make = partial(policy_driver, now, "training")
+        row = evaluate_and_record(run, make, log, save)
         for path in older:
             shutil.rmtree(path)
         if config.self_play:
             now.save(run.checkpoint_path)
         return row
 
-    row: Metrics = {}
+    log = RunLog(folder, progress.steps)
     try:
-        while run.steps_left > 0:
-            sampled = algo.train().get("env_runners", {})
-            steps = progress.steps + int(sampled.get("num_env_steps_sampled", 0))
-            cpu = float(sampled.get(RUNNER_CPU, 0.0)) if config.num_env_runners else 0.0
-            run.update_progress(steps, config.learning_rate, cpu)
-            if run.evaluation_due or run.steps_left <= 0:
-                row = evaluate()
+        return run.train(advance, evaluate, log)
     finally:
         algo.stop()
-    return row

@@ -15,7 +15,7 @@ from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.run_config import RunConfig
 
 if TYPE_CHECKING:
-    from marl_airhockey.learn.logs import RunLog
+    from marl_airhockey.learn.logs import Log
 
 ProgressCallback = Callable[[int, int, Metrics], None]
 """Function called with steps done, steps in all, and the latest evaluation"""
@@ -119,16 +119,11 @@ class TrainingRun(Generic[Config]):
         """Number of steps still to be made."""
         return self.config.total_steps - self.progress.steps
 
-    @property
-    def evaluation_due(self) -> bool:
-        """True if it is time for an evaluation."""
-        return self.progress.steps >= self._next
-
     def train(
         self,
         advance: Callable[[], tuple[int, float]],
         evaluate: Callable[[], Metrics],
-        log: RunLog,
+        log: Log,
     ) -> Metrics:
         """Train from where the run is to its end; return the last evaluation.
 
@@ -143,8 +138,8 @@ class TrainingRun(Generic[Config]):
         try:
             while self.steps_left > 0:
                 steps, rate = advance()
-                self.update_progress(steps, rate)
-                if self.evaluation_due or self.steps_left <= 0:
+                self._update_progress(steps, rate)
+                if steps >= self._next or self.steps_left <= 0:
                     row = evaluate()
                 log.dump(steps)
         finally:
@@ -162,16 +157,15 @@ class TrainingRun(Generic[Config]):
         self.progress.wall_seconds += self._clock[1] - began[1]
         return self._clock[0] - began[0]
 
-    def update_progress(self, steps: int, rate: float, elsewhere: float = 0.0) -> None:
+    def _update_progress(self, steps: int, rate: float) -> None:
         """Set the steps done, count the time since the last call as learning.
 
         Args:
             steps: steps since the beginning of the run.
             rate: learning rate now, with which a resumed run continues.
-            elsewhere: CPU time of other processes since the last call, s.
         """
         progress = self.progress
-        progress.learning_cpu_seconds += self._cpu_seconds() + elsewhere
+        progress.learning_cpu_seconds += self._cpu_seconds()
         progress.steps, progress.rate = steps, rate
         if self._report is not None:
             self._report(steps, self.config.total_steps, self.latest)
@@ -181,7 +175,7 @@ class TrainingRun(Generic[Config]):
     ) -> Metrics:
         """Add a row to ``evaluations.csv``, save policy and progress; return the row.
 
-        The time since the last `update_progress` counts as evaluation.
+        The time since the last step counts as evaluation.
 
         Args:
             metrics: evaluation of the policy as it is.

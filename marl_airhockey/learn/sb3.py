@@ -2,93 +2,165 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.logger import (
-    CSVOutputFormat,
-    Logger,
-    TensorBoardOutputFormat,
-)
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.logger import KVWriter, Logger
+from stable_baselines3.common.utils import ConstantSchedule
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
+from marl_airhockey.envs.slots import SlotEnv
 from marl_airhockey.learn.engine import (
     AdaptiveRate,
     end_setup,
+    evaluate_and_record,
+    initial_weights,
+    note_step,
     other_size,
     training_threads,
 )
 from marl_airhockey.learn.evaluate_policy import Metrics
-from marl_airhockey.learn.logs import progress_path
+from marl_airhockey.learn.logs import RunLog
 from marl_airhockey.learn.network import FixedScale
 from marl_airhockey.learn.ppo_config import PPOConfig
 from marl_airhockey.learn.run import TrainingRun
-from marl_airhockey.learn.sb3_callback import TrainingCallback
-from marl_airhockey.learn.self_play import make_training_env
-from marl_airhockey.learn.settings import load_config
-from marl_airhockey.policies.sb3 import load_weights
+from marl_airhockey.learn.self_play import SelfPlayEnv, make_training_env
+from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import Policy
+from marl_airhockey.policies.sb3 import load_weights, numpy_actor
+
+NEVER = 10**9
+"""Rollouts between two rows that a model writes by itself: rows are the run's"""
 
 
 def train_with_sb3(run: TrainingRun[PPOConfig]) -> Metrics:
     """Train a run from where it stands to its end; return the last evaluation."""
     with training_threads(run.config.torch_threads):
-        return _train(run)
+        return SB3Trainer(run).train()
 
 
-def _train(run: TrainingRun[PPOConfig]) -> Metrics:
-    config, folder, progress = run.config, run.folder, run.progress
-    rate = AdaptiveRate(config, progress.rate or config.learning_rate)
-    env = AirHockeyVecEnv(make_training_env(config, config.num_worlds, folder / "pool"))
-    if progress.steps:
-        model = PPO.load(folder / "last.zip", env, device="cpu")
-        model.learning_rate = model.lr_schedule = rate
-    else:
-        model = build_model(config, env, rate)
-        if config.init:
-            _take_weights(model, Path(config.init))
-    # A resumed run must not repeat the episodes of its beginning.
-    env.seed(config.seed * 10_000 + progress.steps % 9973)
-    model.set_logger(make_logger(folder, progress.steps))
-    callback = TrainingCallback(run, rate)
-    end_setup(run)
-    fresh = progress.steps == 0
-    try:
-        model.learn(run.steps_left, callback=callback, reset_num_timesteps=fresh)
-        row = callback.evaluate()
-        model.logger.dump(progress.steps)
-    finally:
-        model.logger.close()
-        env.close()
-    return row
+class SB3Trainer:
+    """PPO of one run, a rollout at a time.
+
+    Args:
+        run: whose folder is kept up to date.
+    """
+
+    def __init__(self, run: TrainingRun[PPOConfig]) -> None:
+        config, folder, steps = run.config, run.folder, run.progress.steps
+        self._run = run
+        self._slots = make_training_env(config, config.num_worlds, folder / "pool")
+        self._rate = AdaptiveRate(config, run.progress.rate or config.learning_rate)
+        self._env = AirHockeyVecEnv(self._slots)
+        if steps:
+            self._model = PPO.load(folder / "last.zip", self._env, device="cpu")
+        else:
+            self._model = build_model(config, self._env)
+            if config.init:
+                _take_weights(self._model, initial_weights(config))
+        # A resumed run must not repeat the episodes of its beginning.
+        self._env.seed(config.seed * 10_000 + steps % 9973)
+        self._model.set_logger(make_logger(folder, steps))
+        # The first snapshot is due at once: self-play needs an opponent.
+        self._snapshot_due = steps
+        end_setup(run)
+
+    def train(self) -> Metrics:
+        """Train to the end of the run; return the last evaluation."""
+        row = self._run.train(self._advance, self._evaluate, self._model.logger)
+        self._env.close()
+        return row
+
+    def _advance(self) -> tuple[int, float]:
+        """Play a rollout and learn from it; return the steps so far and the rate."""
+        model, config, slots = self._model, self._run.config, self._slots
+        steps = model.num_timesteps
+        if isinstance(slots, SelfPlayEnv) and steps >= self._snapshot_due:
+            slots.snapshot(self._to_numpy(), steps)
+            self._snapshot_due += config.total_steps // config.snapshots
+        left = max(1.0 - (steps + config.rollout) / config.total_steps, 0.0)
+        model.lr_schedule = ConstantSchedule(self._rate(left))
+        learn_for(model, config.rollout, slots)
+        self._rate.adapt(model.logger.name_to_value["train/approx_kl"])
+        return model.num_timesteps, self._rate.rate
+
+    def _to_numpy(self) -> NumpyPolicy:
+        """Return the policy as it is."""
+        card = {**vars(self._model)["card"], "steps": self._model.num_timesteps}
+        return numpy_actor(self._model.policy.state_dict(), card)
+
+    def _evaluate(self) -> Metrics:
+        """Evaluate and save the policy; return the evaluation's row."""
+        run, model = self._run, self._model
+        shape, observe = model.observation_space.shape, run.config.observe
+        make = partial(Policy, partial(_predict, model), shape, observe, "training")
+        row = evaluate_and_record(run, make, model.logger, self._save)
+        if run.config.self_play:
+            self._to_numpy().save(run.checkpoint_path)
+        return row
+
+    def _save(self, name: str) -> None:
+        folder = self._run.folder
+        draft = folder / f"part-{name}.zip"
+        self._model.save(draft)
+        draft.replace(folder / f"{name}.zip")
+        if self._run.config.observe != "pixels":
+            self._to_numpy().save(folder / f"{name}.npz")
 
 
-def _take_weights(model: PPO, run: Path) -> None:
-    """Load the weights of a run into a model, its exploration among them.
+def learn_for(model: BaseAlgorithm, steps: int, slots: SlotEnv) -> None:
+    """Let a model learn for more steps, and note each in its log."""
+
+    def note(_locals: dict[str, Any], _globals: dict[str, Any]) -> bool:
+        note_step(model.logger, slots)
+        return True
+
+    model.learn(steps, note, log_interval=NEVER, reset_num_timesteps=False)
+
+
+def _predict(model: PPO, observation: Any, deterministic: bool) -> Any:
+    return model.predict(observation, deterministic=deterministic)[0]
+
+
+def _take_weights(model: PPO, path: Path) -> None:
+    """Load weights from a file into a model, its exploration among them.
 
     Raises:
-        ValueError: no run, one of another format, or one of another size.
+        ValueError: they are of another size.
     """
-    kept = [run / f"{name}.zip" for name in ("best", "last")]
-    path = next((file for file in kept if file.exists()), None)
-    if path is None:
-        raise ValueError(f"init: {run} is no folder of a run of the engine sb3")
-    if (run / "config.toml").exists():
-        load_config(PPOConfig, run / "config.toml")
-    weights = load_weights(path)
     try:
-        model.policy.load_state_dict(weights)
+        model.policy.load_state_dict(load_weights(path))
     except RuntimeError as error:
         raise other_size(path, error) from error
 
 
+class _Rows(KVWriter):
+    """Output of a logger of stable-baselines3 into a `RunLog`."""
+
+    def __init__(self, log: RunLog) -> None:
+        self._log = log
+
+    def write(
+        self, values: dict[str, Any], excluded: dict[str, Any], step: int = 0
+    ) -> None:
+        for key, value in values.items():
+            self._log.record(key, value)
+        self._log.dump(step)
+
+    def close(self) -> None:
+        self._log.close()
+
+
 def make_logger(folder: Path, steps: int) -> Logger:
     """Return a logger to the files of `logs.RunLog`."""
-    table = CSVOutputFormat(str(progress_path(folder, steps)))
-    return Logger(str(folder), [table, TensorBoardOutputFormat(str(folder))])
+    return Logger(str(folder), [_Rows(RunLog(folder, steps))])
 
 
-def build_model(config: PPOConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -> PPO:
+def build_model(config: PPOConfig, env: AirHockeyVecEnv) -> PPO:
     """Build a fresh PPO model for an environment, with its card as ``model.card``."""
     layout = env.world.observer.layout
     policy, extra = "MlpPolicy", {}
@@ -106,7 +178,7 @@ def build_model(config: PPOConfig, env: AirHockeyVecEnv, rate: AdaptiveRate) -> 
     model = PPO(
         policy,
         env,
-        learning_rate=rate,
+        learning_rate=config.learning_rate,
         n_steps=config.n_steps,
         batch_size=config.batch_size,
         n_epochs=config.n_epochs,

@@ -12,6 +12,7 @@ from marl_airhockey.learn.run_config import RunConfig
 from marl_airhockey.policies.runs import check_run_format
 from marl_airhockey.policies.trust import is_trusted_code, require_trust
 from marl_airhockey.registry import runs_code
+from marl_airhockey.sim.core.checks import build
 from marl_airhockey.sim.core.errors import unknown_name
 
 C = TypeVar("C", bound=RunConfig)
@@ -61,8 +62,8 @@ def load_config(kind: type[C], path: Path) -> C:
     if "algo" in data and "algo" not in names:
         raise ValueError(f"{path.parent}: a run of {data['algo']}, not of PPO")
     try:
-        return kind(**data)
-    except TypeError as error:
+        return build(kind, data)
+    except ValueError as error:
         raise ValueError(f"{path} is no training configuration: {error}") from error
 
 

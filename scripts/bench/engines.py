@@ -24,7 +24,6 @@ from rich.table import Table
 from stable_baselines3.common.logger import Logger
 
 from marl_airhockey.envs.sb3_vec_env import AirHockeyVecEnv
-from marl_airhockey.learn.engine import AdaptiveRate
 from marl_airhockey.learn.ppo_config import preset
 from marl_airhockey.learn.sb3 import build_model
 from marl_airhockey.learn.self_play import make_training_env
@@ -51,7 +50,7 @@ def sb3(scenario: str, worlds: int, folder: Path) -> Callable[[], Iteration]:
     """Return a function that runs an iteration of the engine "sb3"."""
     config = preset(scenario, {"num_worlds": worlds})
     env = AirHockeyVecEnv(make_training_env(config, worlds, folder))
-    model = build_model(config, env, AdaptiveRate(config, config.learning_rate))
+    model = build_model(config, env)
     model.set_logger(Logger(None, []))
     steps = config.n_steps * config.slots
 

@@ -11,7 +11,7 @@ import marl_airhockey as ah
 from marl_airhockey.cli.main import app
 from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.learn.hindsight.config import CHOICES, hindsight_config
-from marl_airhockey.learn.hindsight.sac import BUFFERS, Evaluations, build_model
+from marl_airhockey.learn.hindsight.sac import BUFFERS, HindsightTrainer, build_model
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.learn.train import load_any_config, run_training
 from marl_airhockey.policies.load import load_policy
@@ -30,14 +30,10 @@ SMALL = {
 def test_the_policy_of_a_file_is_that_of_the_model(tmp_path):
     config = hindsight_config("reach", SMALL)
     env = ah.make_sb3_vec("reach", 4, **config.keywords)
-    model = build_model(config, env)
-    model.learn(1200)
-    run = TrainingRun(config, tmp_path)
-    callback = Evaluations(run)
-    callback.init_callback(model)
-    policy = callback._policy()
-    seen = env.reset()
-    wanted, _ = model.predict(seen, deterministic=True)
+    trainer = HindsightTrainer(TrainingRun(config, tmp_path))
+    trainer.model.learn(1200)
+    policy, seen = trainer.policy(), env.reset()
+    wanted, _ = trainer.model.predict(seen, deterministic=True)
     np.testing.assert_allclose(policy(seen), wanted, atol=1e-5)
     assert np.isfinite(policy.log_std).all()
 

@@ -112,10 +112,9 @@ def test_a_policy_can_sit_in_any_seat_by_its_path(touch_run):
 def test_an_exported_policy_is_one_small_file(tmp_path):
     config = preset("reach", SMALL)
     env = ah.make_sb3_vec("reach", 32, backend="numba")
-    from marl_airhockey.learn.sb3_callback import AdaptiveRate
     from marl_airhockey.policies.sb3 import numpy_actor
 
-    model = build_model(config, env, AdaptiveRate(config, 1e-3))
+    model = build_model(config, env)
     numpy_actor(model.policy.state_dict(), {"scenario": "reach"}).save(
         tmp_path / "policy.npz"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from marl_airhockey.learn.offline.config import OfflineConfig
 from marl_airhockey.learn.offline.dataset import load_dataset
 from marl_airhockey.learn.run import TrainingRun
 from marl_airhockey.policies.numpy_policy import NumpyPolicy
+from marl_airhockey.policies.policy import policy_driver
 from marl_airhockey.sim.contracts.scenario import GoalScenario
 from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
@@ -116,7 +118,8 @@ class Learner:
 
     def _evaluate(self) -> Metrics:
         """Evaluate and save the policy; return the evaluation's row."""
-        return evaluate_and_record(self._run, self.policy(), self._log, self._save)
+        make = partial(policy_driver, self.policy(), "training")
+        return evaluate_and_record(self._run, make, self._log, self._save)
 
     def _save(self, name: str) -> None:
         """Write the policy, and all that it goes on from, under a name."""

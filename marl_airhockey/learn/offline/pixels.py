@@ -15,8 +15,13 @@ import torch
 from torch import Tensor, nn
 
 from marl_airhockey.data.reader import episodes_of
-from marl_airhockey.learn.engine import load_state, save_state, training_threads
-from marl_airhockey.learn.evaluate_policy import Metrics, evaluate_policy
+from marl_airhockey.learn.engine import (
+    evaluate_and_record,
+    load_state,
+    save_state,
+    training_threads,
+)
+from marl_airhockey.learn.evaluate_policy import Metrics
 from marl_airhockey.learn.logs import RunLog
 from marl_airhockey.learn.offline.choice import best_of
 from marl_airhockey.learn.offline.config import OfflineConfig
@@ -193,8 +198,10 @@ class PixelCloning:
         return last, self._config.learning_rate
 
     def _evaluate(self) -> Metrics:
-        found = evaluate_policy(lambda _: self.model.driver(), self._config)
-        return self._run.record_evaluation(found, self._save)
+        def make(_mean: bool) -> Driver:
+            return self.model.driver()
+
+        return evaluate_and_record(self._run, make, self._log, self._save)
 
     def _descend(self, step: int) -> float:
         """Descend once on a batch of steps; return the loss."""
