@@ -40,10 +40,10 @@ class HitGoal(FewShots, GoalScenario):
     """Radius of the circle (m)."""
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:
-        worlds = len(rng)
+        worlds, table = len(rng), self.scene.table
         return {
             **super().initial_memory(state, rng),
-            "goal": starts.uniform_box(rng, (0.05, 0.60), (-0.205, 0.205)),
+            "goal": starts.uniform_box(rng, table, (0.05, 0.60), (-0.205, 0.205)),
             "near": np.full(worlds, np.inf),
             "entered": np.zeros(worlds, np.bool_),
         }

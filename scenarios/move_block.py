@@ -54,10 +54,10 @@ class MoveBlock(FewShots):
         )
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
-        state = starts.falling(rng, self.scene)
+        state, table = starts.falling(rng, self.scene), self.scene.table
 
         def sample(some: RandomStreams) -> Array:
-            return starts.uniform_box(some, (0.05, 0.40), (-0.229, 0.229))
+            return starts.uniform_box(some, table, (0.05, 0.40), (-0.229, 0.229))
 
         def aside(rows: Array) -> Array:
             # The puck must not fall onto the block.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -57,18 +57,20 @@ class StrikeCrowd(Scenario):
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = self.scene.still_state(worlds)
-        state.position[:, 0] = starts.uniform_box(rng, (-0.74, -0.64), starts.PADDLE_Y)
-        state.position[:, 1] = starts.uniform_box(rng, (-0.49, -0.32), (-0.10, 0.10))
+        box = partial(starts.uniform_box, rng, self.scene.table)
+        state.paddle[:, 0] = box((-0.74, -0.64), starts.PADDLE_Y)
+        state.puck[:, 0] = box((-0.49, -0.32), (-0.10, 0.10))
         pitch = 2 * self.scene.block_radius + GAP
         lift = 0.87 * pitch if self.shape == "disc" else pitch
+        apex = self.scene.table.from_standard(np.array([(0.25, -0.10), (0.25, 0.10)]))
         triangle = np.array(
             [
-                (0.25 + row * lift, (k - 0.5 * row) * pitch)
+                (apex[0, 0] + row * lift, (k - 0.5 * row) * pitch)
                 for row in range(ROWS)
                 for k in range(row + 1)
             ]
         )
-        middle = rng.uniform(-0.10, 0.10)
+        middle = rng.uniform(*apex[:, 1])
         state.block[:] = triangle
         state.block[..., 1] += middle[:, None]
         return state, self.initial_memory(state, rng)

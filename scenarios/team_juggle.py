@@ -63,7 +63,8 @@ class TeamJuggle(Scenario):
 
     def reset(self, rng: RandomStreams, worlds: int) -> tuple[State, Memory]:
         state = starts.falling(rng, self.scene)
-        state.paddle[:] = [(-0.65, 0.15), (-0.65, -0.15)]
+        homes = np.array([(-0.65, 0.15), (-0.65, -0.15)])
+        state.paddle[:] = self.scene.table.from_standard(homes)
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,7 @@ from marl_airhockey.sim.core.parameters import PARAMETERS
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
+from marl_airhockey.sim.core.table import Table
 from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.toolkit.starts import falling_puck, redraw, roll
 from marl_airhockey.types import Array
@@ -27,13 +30,36 @@ TRIES = 200
 """Number of shots tried at a puck; about 3 % are legal and reach such a place."""
 PUSH = (0.2, 0.6)
 """Range of the paddle's speed along the normal, as a share of its top speed."""
-ASIDE = 0.24
-"""Largest |y| of the paddle (m)."""
+STRUCK = ((-0.65, 0.0), (-0.30, 0.0))
+"""Range of x at which the puck is struck (m)."""
+PADDLE = ((-0.74, -0.24), (-0.38, 0.24))
+"""Lower and upper corner of the paddle's places (m)."""
+GOAL = ((0.05, -0.205), (0.738, 0.205))
+"""Lower and upper corner of the goals' places (m)."""
 
 
-LOW, HIGH = np.array([(-0.65, -0.30), (-0.5, 0.5), PUSH, (0.0, 1.0)]).T
-"""Ranges of a shot: x at which the puck is struck (m), angle of the normal (rad), speed
-of the paddle along it (of top speed), and which point of the way is the goal."""
+class Places(NamedTuple):
+    """Places of a shot on a table, each by its lower and upper corner (2, 2), m."""
+
+    struck: Array
+    paddle: Array
+    goal: Array
+
+    @staticmethod
+    @cache
+    def on(table: Table) -> Places:
+        """Carry those of the standard table over to another."""
+        boxes = (STRUCK, PADDLE, GOAL)
+        return Places(*(table.from_standard(np.array(box)) for box in boxes))
+
+    def ranges(self) -> tuple[Array, Array]:
+        """Return the ends (4,) of the ranges of a shot.
+
+        x at which the puck is struck (m), angle of the normal (rad), speed of the
+        paddle along it (of top speed), and which point of the way is the goal.
+        """
+        rows = np.array([self.struck[:, 0], (-0.5, 0.5), PUSH, (0.0, 1.0)])
+        return rows[:, 0], rows[:, 1]
 
 
 def playable_puck(rng: RandomStreams, scene: Scene) -> Array:
@@ -43,14 +69,17 @@ def playable_puck(rng: RandomStreams, scene: Scene) -> Array:
         (W, 5), see `starts.falling_puck`.
     """
     physics = {name: p.default for name, p in PARAMETERS.items()} | scene.defaults
-    half = float(scene.table.size[1]) / 2 - scene.table.puck_radius
+    table, places = scene.table, Places.on(scene.table)
+    half = float(table.size[1]) / 2 - table.puck_radius
 
     def passes(pucks: Array) -> Array:
         way = roll(pucks, STEP, STEPS, half, physics)
-        near = (way[..., 0] < HIGH[0]) & (way[..., 0] > LOW[0])
-        return np.asarray((near & (np.abs(way[..., 1]) < ASIDE)).mean(-1) > 0.02)
+        low, high = places.struck[:, 0]
+        near = (way[..., 0] < high) & (way[..., 0] > low)
+        aside = np.abs(way[..., 1]) < places.paddle[1, 1]
+        return np.asarray((near & aside).mean(-1) > 0.02)
 
-    return redraw(rng, falling_puck, passes)
+    return redraw(rng, lambda some: falling_puck(some, table), passes)
 
 
 def draw_shots(
@@ -58,12 +87,12 @@ def draw_shots(
 ) -> Array:
     """Draw a goal on a shot at puck 0 of each world that a robot seat can play.
 
-    The puck falls to x in -0.65 .. -0.30 and is struck there with a contact normal
+    The puck falls to a place in `STRUCK` and is struck there with a contact normal
     within 0.5 rad of straight up and a normal paddle speed of `PUSH`, the paddle's
-    centre lying in x -0.74 .. -0.38 and |y| <= `ASIDE`; it slides on with banks, under
-    the physics of the episode. The goal is a random point of that path with x 0.05 ..
-    0.738, |y| < 0.205, within 30 deg of straight up and vx at least 0.5 m/s. Where none
-    is found, it is the middle of these places, straight up at 0.7 m/s.
+    centre lying in `PADDLE`; it slides on with banks, under the physics of the episode.
+    The goal is a random point of that path in `GOAL`, within 30 deg of straight up and
+    vx at least 0.5 m/s. Where none is found, it is (0.39, 0), straight up at 0.7 m/s.
+    Places are those of the standard table, see `Table.from_standard`.
 
     Args:
         rng: one stream per row.
@@ -79,15 +108,17 @@ def draw_shots(
     motion, edge = state.puck_velocity[:, 0], state.puck_edge[:, :1]
     pucks = np.concatenate([state.puck[:, 0], motion, edge], -1)
     falls = roll(pucks, STEP, STEPS, half, laws)
-    goals, left = np.tile([0.39, 0.0, 0.7, 0.0], (len(rng), 1)), np.arange(len(rng))
+    places, end = Places.on(table), table.size[0] / 2 - table.puck_radius
+    none = [*table.from_standard(np.array([0.39, 0.0])), 0.7, 0.0]
+    goals, left = np.tile(none, (len(rng), 1)), np.arange(len(rng))
     for _ in range(TRIES):
-        draws = rng.select(left).uniform(LOW, HIGH, 4)
+        draws = rng.select(left).uniform(*places.ranges(), 4)
         some = {name: value[left] for name, value in laws.items()}
         struck, legal = _strike(falls, left, draws, scene, some)
         rows = np.flatnonzero(legal)
         some = {name: value[rows] for name, value in some.items()}
         path, moment = roll(struck[rows], STEP, STEPS, half, some), np.empty_like(rows)
-        _choose(path, table.size[0] / 2 - table.puck_radius, draws[rows, 3], moment)
+        _choose(path, end, places.goal, draws[rows, 3], moment)
         on = np.flatnonzero(moment >= 0)
         goals[left[rows[on]]] = path[on, moment[on], :4]
         left = np.delete(left, rows[on])
@@ -108,7 +139,7 @@ def _strike(
     Args:
         falls: ways of all pucks, see `starts.roll`.
         worlds: (W,) those that are struck, by index.
-        draws: (W, 4) in `LOW` .. `HIGH`.
+        draws: (W, 4) in `Places.ranges`.
         scene: table.
         physics: parameters by name, (W,) each.
     """
@@ -117,8 +148,8 @@ def _strike(
     struck = falls[worlds, below.argmax(-1)]
     normal = np.stack([np.cos(angle), np.sin(angle)], -1)
     paddle = struck[:, :2] - normal * (table.paddle_radius + table.puck_radius)
-    legal = below.any(-1) & (np.abs(paddle[:, 1]) <= ASIDE)
-    legal &= (paddle[:, 0] >= -0.74) & (paddle[:, 0] <= -0.38)
+    low, high = Places.on(table).paddle
+    legal = below.any(-1) & ((paddle >= low) & (paddle <= high)).all(-1)
     push = physics["paddle_speed"] * draws[:, 2]
     laws = physics["paddle_restitution"], physics["paddle_friction"]
     return struck, legal & _hit(struck, normal, push, *laws)
@@ -145,7 +176,7 @@ def _hit(
 
 
 @compiled()
-def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
+def _choose(path: Array, end: float, goal: Array, choice: Array, moment: Array) -> None:
     """Choose a valid index of each rising path (W, T, 4); -1 if there is none."""
     steep = np.tan(np.radians(30.0))
     for w in range(len(path)):
@@ -158,7 +189,7 @@ def _choose(path: Array, end: float, choice: Array, moment: Array) -> None:
                 vx, vy = path[w, t, 2], path[w, t, 3]
                 if vx <= 0.2 or x >= end:
                     break
-                if not (0.05 < x < 0.738 and abs(y) < 0.205):
+                if not (goal[0, 0] < x < goal[1, 0] and abs(y) < goal[1, 1]):
                     continue
                 if vx >= 0.5 and abs(vy) < steep * vx:
                     if count == wanted:

@@ -13,7 +13,7 @@ from marl_airhockey.sim.core.laws import fly, impulse, wall_restitution
 from marl_airhockey.sim.core.rng import RandomStreams
 from marl_airhockey.sim.core.scene import Scene
 from marl_airhockey.sim.core.state import State
-from marl_airhockey.sim.core.table import GRAVITY
+from marl_airhockey.sim.core.table import GRAVITY, Table
 from marl_airhockey.sim.jit.cache import compiled
 from marl_airhockey.types import Array
 
@@ -23,16 +23,21 @@ PADDLE_Y = (-0.10, 0.10)
 
 
 def uniform_box(
-    rng: RandomStreams, x: tuple[float, float], y: tuple[float, float]
+    rng: RandomStreams, table: Table, x: tuple[float, float], y: tuple[float, float]
 ) -> Array:
-    """(W, 2) uniform points in a box of the standard table, m."""
-    low, high = _corners(x, y)
+    """(W, 2) uniform points in a box of the standard table, carried over to ``table``.
+
+    See `Table.from_standard`; m.
+    """
+    low, high = _corners(table, x, y)
     return rng.uniform(low, high, 2)
 
 
 @cache
-def _corners(x: tuple[float, float], y: tuple[float, float]) -> tuple[Array, Array]:
-    low, high = np.array([x, y]).T
+def _corners(
+    table: Table, x: tuple[float, float], y: tuple[float, float]
+) -> tuple[Array, Array]:
+    low, high = table.from_standard(np.array([x, y]).T)
     return low, high
 
 
@@ -49,13 +54,22 @@ HOME = np.array([PADDLE_X, PADDLE_Y, *FALLING])
 """The same behind those of x and y of the paddle (m)."""
 
 
-def falling_puck(rng: RandomStreams) -> Array:
+@cache
+def _home(table: Table) -> Array:
+    """Return the lower and upper ends (2, 7) of `HOME` on a table."""
+    ends = HOME.T.copy()
+    for first in (0, 2):
+        ends[:, first : first + 2] = table.from_standard(ends[:, first : first + 2])
+    return ends
+
+
+def falling_puck(rng: RandomStreams, table: Table) -> Array:
     """Draw pucks that fall from the far half.
 
     Returns:
         (W, 5) x, y, vx, vy, m, m/s, and speed of the edge by spin, m/s.
     """
-    puck = rng.uniform(FALLING[:, 0], FALLING[:, 1], 5)
+    puck = rng.uniform(*_home(table)[:, 2:], 5)
     _spin(puck)
     return puck
 
@@ -83,10 +97,11 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
 
     No puck overlaps another.
     """
-    state, draws = scene.still_state(len(rng)), rng.uniform(HOME[:, 0], HOME[:, 1], 7)
+    table, state = scene.table, scene.still_state(len(rng))
+    draws = rng.uniform(*_home(table), 7)
     state.position[:, 0], puck = draws[:, :2], draws[:, 2:]
     _spin(puck)
-    first, radius = scene.bodies.puck.start, scene.table.puck_radius
+    first, radius = scene.bodies.puck.start, table.puck_radius
     for k in range(first, scene.bodies.puck.stop):
         others = state.position[:, first:k]
 
@@ -95,7 +110,7 @@ def falling(rng: RandomStreams, scene: Scene) -> State:
             return np.asarray((gap > 3 * radius).all(-1))
 
         if k > first:
-            puck = redraw(rng, falling_puck, apart)
+            puck = redraw(rng, lambda some: falling_puck(some, table), apart)
         _drop(puck, k, state.position, state.velocity, state.spin)
     state.spin[:, scene.bodies.puck] /= radius
     return state

@@ -5,7 +5,6 @@ import pytest
 from pair import Pair
 
 import marl_airhockey as ah
-from marl_airhockey.evaluation.evaluate import evaluate
 from marl_airhockey.registry import driver_class, make_driver
 from marl_airhockey.sim.core.rng import StreamSet
 
@@ -59,34 +58,6 @@ def test_it_plays_both_ends_alike(agent):
         if near.memory["goals"].any():
             break  # The serve after a goal is drawn by each for itself.
         np.testing.assert_allclose(near.command[:, 0], -far.command[:, 1], atol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("task", "script", "bar"),
-    [
-        ("reach", "reacher", 0.97),
-        ("reach_velocity", "reacher", 0.95),
-        ("touch", "goalkeeper", 0.95),
-        ("strike", "striker", 0.95),
-        ("juggle", "striker", 0.85),
-        ("puck_velocity", "striker", 0.95),
-        # It aims without spin and rails, at a circle that is as small as the puck.
-        ("hit_goal", "striker", 0.50),
-        ("move_block", "striker", 0.70),
-    ],
-)
-def test_a_script_is_an_honest_baseline(task, script, bar):
-    result = evaluate(script, task, episodes=200)
-    assert result.success >= bar
-    low, high = result.success_interval
-    assert low <= result.success <= high
-
-
-@pytest.mark.parametrize(("task", "bar"), [("juggle", 0.9), ("touch", 0.95)])
-def test_the_striker_knows_the_width_of_its_table(task, bar):
-    options = {"table": "full_size"}
-    found = evaluate("striker", task, episodes=100, exact=True, options=options)
-    assert found.success >= bar
 
 
 def test_a_driver_keeps_its_own_pace():

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import marl_airhockey as ah
+from marl_airhockey.sim.core.table import TABLES
 
 
 @pytest.mark.parametrize("profile", ["ideal", "ur5e"])
-@pytest.mark.parametrize("table", ["standard", "full_size"])
+@pytest.mark.parametrize("table", TABLES)
 def test_nearly_all_falling_pucks_can_be_intercepted(table, profile):
     """A puck passes the reach where a paddle can be, a servo's lag after the start."""
     worlds = 1000
@@ -16,10 +17,11 @@ def test_nearly_all_falling_pucks_can_be_intercepted(table, profile):
     )
     world.autoreset = False
     world.reset(0)
-    paddle, touch = world.state.paddle[:, 0].copy(), 0.079
+    paddle = world.state.paddle[:, 0].copy()
+    touch = TABLES[table].paddle_radius + TABLES[table].puck_radius
     normals, offsets = world.reach.normals[0], world.reach.offsets[0]
     met = np.zeros(worlds, bool)
-    for _ in range(100):
+    for _ in range(140):
         world.step(np.zeros((worlds, 1, 2)))
         puck, time = world.state.puck[:, 0], world.state.time
         inside = (puck @ normals.T + offsets >= 0.0).all(-1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -53,8 +53,9 @@ class Template(Scenario):
         # A first state and memory for each world, drawn from `rng` and nothing else.
         # Bodies are sorted by kind: paddles, then pucks.
         state = self.scene.still_state(worlds)
-        state.position[:, 0] = starts.uniform_box(rng, (-0.74, -0.64), starts.PADDLE_Y)
-        state.position[:, 1] = starts.uniform_box(rng, (-0.49, -0.32), (-0.20, 0.20))
+        box = partial(starts.uniform_box, rng, self.scene.table)
+        state.paddle[:, 0] = box((-0.74, -0.64), starts.PADDLE_Y)
+        state.puck[:, 0] = box((-0.49, -0.32), (-0.20, 0.20))
         return state, self.initial_memory(state, rng)
 
     def initial_memory(self, state: State, rng: RandomStreams) -> Memory:

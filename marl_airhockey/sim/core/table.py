@@ -116,6 +116,19 @@ class Table:
         """Extent of the bounding box (2,), m."""
         return np.asarray(np.ptp(np.asarray(self.vertices), axis=0))
 
+    def from_standard(self, points: Array) -> Array:
+        """Carry points (..., 2) of the standard table over to this one, m.
+
+        What a UR5e reaches there it reaches here: x is linear from the home side to the
+        near edge of `robot_reach`, to its far edge, and to the far end; y is
+        proportional to its width. On the standard table nothing changes.
+        """
+        (x, width), (new_x, new_width) = _knots(TABLES["standard"]), _knots(self)
+        if x == new_x and width == new_width:
+            return points
+        along = np.interp(points[..., 0], x, new_x)
+        return np.stack([along, points[..., 1] * (new_width / width)], -1)
+
     def ends(self, side: int) -> tuple[Array, Array]:
         """Return the two corners of a side, (2,) each, m."""
         corners = np.asarray(self.vertices, dtype=float)
@@ -127,16 +140,28 @@ class Table:
         return np.array([[c, s], [-s, c]])
 
 
+def _knots(table: Table) -> tuple[tuple[float, ...], float]:
+    """Return x of home, of both edges of the reach and of the far end; its width, m."""
+    home = -float(table.offsets[0])
+    along, across = zip(*table.robot_reach, strict=True)
+    far = home + float(table.size[0])
+    return (home, home + min(along), home + max(along), far), max(across) - min(across)
+
+
 TABLES: dict[str, Table] = {
     "standard": Table.rectangle(1.6764, 0.6096),
     "full_size": replace(Table.rectangle(1.9304, 0.8636), robot_reach=WIDE),
     "ubc_pro": replace(
-        Table.rectangle(2.362, 1.144), puck_radius=0.0413, paddle_radius=0.0505
+        Table.rectangle(2.362, 1.144),
+        puck_radius=0.0413,
+        paddle_radius=0.0505,
+        robot_reach=WIDE,
     ),
     "ubc_wood": replace(
         Table.rectangle(1.9885, 0.9905, **PRESETS["wooden"]),
         puck_radius=0.03145,
         paddle_radius=0.0501,
+        robot_reach=WIDE,
     ),
 }
 """Table presets: the 66 x 24 in workspace and the 76 x 34 in table of the paper, and
