@@ -10,16 +10,17 @@ SKIPPED = 8
 """Number of first sightings, whose velocity is not known yet"""
 WEIGHT = 0.1
 """Weight of the newest innovation in their mean"""
-LARGEST = 0.06
-"""Innovation above which a larger one counts no more, m"""
+LARGEST = 0.03
+"""Innovation above which a larger one counts no more, m, so that one wrong sighting is
+not enough: it adds 3 mm to the mean"""
 USUAL = 0.001
 """First value of the usual innovation, m"""
 LEARNING = 0.02
 """Share by which the usual innovation changes with each sighting"""
 LEAST, FACTOR = 0.005, 4.0
 """Mean innovation that is too large, m, and as a multiple of the usual one. In the
-virtual lab the mean stays below 1.7 mm; it reaches 7 mm when the camera is moved by
-2 cm, and 44 mm with a second puck."""
+virtual lab the mean stays below 3 mm; it reaches 7 mm when the camera is moved by
+2 cm."""
 
 
 class Innovations:

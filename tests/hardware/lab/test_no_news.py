@@ -67,6 +67,7 @@ def test_usual_innovations_and_single_jumps_are_no_trouble():
     usual = rng.rayleigh(0.7, 300)
     usual[::40] = 11.0
     assert innovations(usual).trouble == ""
+    assert innovations([*usual, 250.0]).trouble == ""
 
 
 @pytest.mark.parametrize("usual", [0.7, 3.0])
