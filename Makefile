@@ -91,6 +91,7 @@ lint: setup ## Check format, style, spelling, layers and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/codespell README.md CHANGELOG.md CONTRIBUTING.md docs marl_airhockey scenarios drivers scripts tests
+	$(BIN)/python scripts/check_prose.py
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/mypy
 
@@ -100,6 +101,8 @@ wheel: setup ## Build a wheel into dist/ that starts without compiling (TARGET=g
 	$(BIN)/python -m build --wheel --outdir dist .
 
 docs: setup ## Build the documentation into site/
+	$(BIN)/python scripts/reproduce/scenario_pages.py
+	$(BIN)/typer marl_airhockey.cli.main utils docs --name airhockey --title "Command line" --output docs/cli.md
 	$(BIN)/mkdocs build --strict
 
 clean: ## Remove what was made, the environment included

@@ -1,4 +1,4 @@
-"""Two against two: mates share a half and the reward."""
+"""Two players against two, who share the goals and the reward."""
 
 from __future__ import annotations
 
@@ -10,7 +10,15 @@ from marl_airhockey.toolkit.versus import Versus
 
 @dataclass(frozen=True, kw_only=True)
 class Doubles(Versus):
-    """Game of two seats at either end, side by side; rules as in `versus.Versus`."""
+    """Game of two teams of two players.
+
+    Start:
+        The paddles of a team are side by side in front of their goal. The puck is
+        served from the centre to one of the teams, which is sampled.
+
+    Termination:
+        A team wins.
+    """
 
     apart: Metres = 0.24
     """Distance of mates at the start (m)."""

@@ -1,4 +1,4 @@
-"""One against one: get the puck into the other's goal."""
+"""One player against one: shoot the puck into the opponent's goal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from marl_airhockey.toolkit.versus import Versus
 
 @dataclass(frozen=True, kw_only=True)
 class Duel(Versus):
-    """Game of two seats at opposite ends; rules as in `versus.Versus`."""
+    """Game of two players at opposite ends.
+
+    Start:
+        Each paddle is in front of its goal. The puck is served from the centre to one
+        of the players, who is sampled.
+
+    Termination:
+        A player wins.
+    """
 
     @property
     def lineup(self) -> tuple[tuple[int, float], ...]:

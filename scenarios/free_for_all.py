@@ -1,4 +1,4 @@
-"""Free for all: a polygon with a goal and three lives for each seat."""
+"""Several players on a polygon, each with a goal and lives."""
 
 from __future__ import annotations
 
@@ -33,13 +33,21 @@ START = 0.7
 
 @dataclass(frozen=True, kw_only=True)
 class FreeForAll(Scenario):
-    """Game in which a goal costs its owner a life and 1 and pays the last toucher 1.
+    """Game of several players on a polygon, each with a goal and some lives.
 
-    A seat without lives is out: its goal becomes wall and its paddle is parked. The
-    last seat left wins; when the clock ends the game, the one with most lives, of these
-    the one with most shots on goal. Serves go to the seat that lost a life; a puck that
-    is held for ``possession`` seconds or is at rest out of every reach goes to the next
-    seat.
+    A goal costs its owner a life. A player without lives is eliminated: its goal
+    becomes a wall and its paddle is removed. The last player wins. If the time limit
+    ends the game, the player with most lives wins, and among equals the one with most
+    shots on goal. After a goal the puck is served to the player who lost a life. A puck
+    that is held for ``possession`` seconds, or rests where nobody reaches it, is served
+    to the next player.
+
+    Start:
+        Each paddle is in front of its goal. The puck is served from the centre to one
+        of the players, who is sampled.
+
+    Termination:
+        One player is left.
     """
 
     announced = ("lives", "shots", "stopped", "scorer", "served", "serve")

@@ -1,4 +1,4 @@
-"""Hit the falling puck into a goal circle."""
+"""Strike a falling puck into a circle."""
 
 from __future__ import annotations
 
@@ -27,10 +27,17 @@ from marl_airhockey.toolkit.falling import FewShots
 
 @dataclass(frozen=True, kw_only=True)
 class HitGoal(FewShots, GoalScenario):
-    """Task that rewards how near the rising puck has come to the circle, per metre.
+    """Task of striking a falling puck into a circle.
 
-    Only a touched and rising puck counts: a falling one crosses the circle by chance.
-    One of the first ``shots`` must enter the circle.
+    Only a puck that was touched and rises counts, because a falling puck crosses the
+    circle by chance. It must enter the circle after one of the first ``shots`` touches.
+
+    Start:
+        The paddle is near the home end. The puck falls from the far half. The centre of
+        the circle is sampled uniformly from the far half.
+
+    Termination:
+        Success, a touch after the last shot, or the puck crosses the home line.
     """
 
     version: ClassVar[int] = 1

@@ -1,4 +1,4 @@
-"""Hit the falling puck into a goal circle with a target velocity."""
+"""Strike a falling puck through a circle with a target velocity."""
 
 from __future__ import annotations
 
@@ -32,11 +32,18 @@ from marl_airhockey.toolkit.shots import draw_shots, playable_puck
 
 @dataclass(frozen=True, kw_only=True)
 class HitGoalVelocity(FewShots, GoalScenario):
-    """Task that rewards the best match of the rising puck in position and velocity.
+    """Task of striking a falling puck through a circle with a target velocity.
 
-    The goal is a point of a legal shot at this very puck under the physics of the
-    episode (see `shots.draw_shots`), so that it is feasible. It must be met by one of
-    the first ``shots``.
+    The goal is the position and velocity of the puck at one instant of a feasible shot,
+    which is simulated with the physics of this episode (see `shots.draw_shots`). The
+    puck must meet it after one of the first ``shots`` touches.
+
+    Start:
+        The paddle is near the home end. The puck falls from the far half into the
+        workspace. The goal is a point of a feasible shot in the far half.
+
+    Termination:
+        Success, a touch after the last shot, or the puck crosses the home line.
     """
 
     version: ClassVar[int] = 1

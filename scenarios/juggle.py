@@ -1,4 +1,4 @@
-"""Keep the puck up: hit it again and again."""
+"""Hit a falling puck up again and again."""
 
 from __future__ import annotations
 
@@ -28,10 +28,16 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Juggle(Scenario):
-    """Task in which a hit pays 1 when the puck has risen ``lift`` above its contact.
+    """Task of hitting a falling puck up again and again.
 
-    A carried or cradled puck never rises above its last contact and earns nothing;
-    losing a puck at home ends the episode and costs 2.
+    A hit counts when the puck has risen ``lift`` above the point of contact. A puck
+    that is carried never rises above its last contact and gives no reward.
+
+    Start:
+        The paddle is near the home end. The puck falls from the far half.
+
+    Termination:
+        The puck crosses the home line.
     """
 
     seconds: Seconds = 15.0

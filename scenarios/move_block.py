@@ -1,4 +1,4 @@
-"""Hit the falling puck so that it moves a block."""
+"""Strike a falling puck so that it moves a block."""
 
 from __future__ import annotations
 
@@ -28,11 +28,17 @@ from marl_airhockey.toolkit.falling import FewShots
 
 @dataclass(frozen=True, kw_only=True)
 class MoveBlock(FewShots):
-    """Task that rewards the largest displacement of the block by a shot, per metre.
+    """Task of striking a falling puck so that it moves a block.
 
-    Only a touched and rising puck counts: a falling one meets the block by chance. One
-    of the first ``shots`` must move it. Approaching the puck, and then the puck's
-    approach to the block, are rewarded as guidance.
+    Only a puck that was touched and rises counts, because a falling puck meets the
+    block by chance. One of the first ``shots`` touches must move the block by ``way``.
+
+    Start:
+        The paddle is near the home end. The puck falls from the far half. The block
+        rests in the far half, at least 0.09 m beside the puck.
+
+    Termination:
+        Success, a touch after the last shot, or the puck crosses the home line.
     """
 
     version: ClassVar[int] = 1

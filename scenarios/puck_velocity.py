@@ -1,4 +1,4 @@
-"""Hit the falling puck back up fast."""
+"""Hit a falling puck back with a high speed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,14 @@ from marl_airhockey.toolkit.falling import FallingPuck
 
 @dataclass(frozen=True, kw_only=True)
 class PuckVelocity(FallingPuck):
-    """Task that rewards the best upward speed after a touch, and the approach."""
+    """Task of hitting a falling puck back with a high speed.
+
+    Start:
+        The paddle is near the home end. The puck falls from the far half.
+
+    Termination:
+        Success, or the puck crosses the home line.
+    """
 
     seconds: Seconds = 5.0
     fast: Speed = 1.2

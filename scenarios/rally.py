@@ -1,4 +1,4 @@
-"""Keep the puck going to and fro, together."""
+"""Two players keep a puck going to and fro."""
 
 from __future__ import annotations
 
@@ -27,14 +27,19 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Rally(Scenario):
-    """Game in which a crossing of the middle pays both 1 if the puck comes from afar.
+    """Game in which two players keep a puck going to and fro.
 
-    The puck must have been beyond ``depth`` in the half that it leaves; it need not go
-    to the ends of the table. The seat there
-    must have touched it last and must not be the one of the last counted crossing.
-    Only distinct touches are strikes: a puck that both squeeze at the middle earns
-    nothing. ``patience`` seconds without a counted crossing end the rally, and so does
-    a puck at rest.
+    A crossing of the centre line counts if the puck was more than ``depth`` behind it
+    and the player on that side touched it last. Counted crossings must alternate in
+    direction. Only distinct touches count: a puck that both paddles squeeze at the
+    centre line gives no reward.
+
+    Start:
+        The paddles are near their ends. The puck is served from the centre to one of
+        the players, who is sampled.
+
+    Termination:
+        ``patience`` seconds without a counted crossing, or a puck at rest.
     """
 
     announced = ("counted", "crossings", "idle")

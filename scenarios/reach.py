@@ -1,4 +1,4 @@
-"""Move the paddle to a goal and come to rest there."""
+"""Move the paddle to a goal and stop there."""
 
 from __future__ import annotations
 
@@ -28,10 +28,17 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Reach(GoalScenario):
-    """Task that rewards progress toward the goal and, once, arrival; time costs.
+    """Task of moving the paddle to a goal and stopping there.
 
-    The goal is at least ``far`` from the paddle, so that standing still never succeeds.
-    Arrival means rest, so that driving through the goal does not succeed either.
+    A paddle that drives through the goal does not succeed: it must be at rest for
+    ``hold`` seconds.
+
+    Start:
+        The paddle is near the home end. The goal is sampled uniformly from the
+        workspace, at least ``far`` from the paddle.
+
+    Termination:
+        Success.
     """
 
     version: ClassVar[int] = 1

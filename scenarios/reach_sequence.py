@@ -1,4 +1,4 @@
-"""Pass through several goals, one after the other."""
+"""Pass several goals in a given order."""
 
 from __future__ import annotations
 
@@ -26,10 +26,18 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class ReachSequence(Scenario):
-    """Task that rewards progress toward the goal in turn and, once each, its passage.
+    """Task of passing several goals in a given order.
 
-    Observed are the goal in turn and the one after it, so that a way through both can
-    be planned; the last one is also the one after itself. Time costs.
+    The observation contains the current goal and the one after it, so that a
+    trajectory through both can be planned. After the last goal there is no other: it is
+    then observed twice.
+
+    Start:
+        The paddle is near the home end. Each goal is sampled from the workspace, at
+        least ``far`` from the goal before it.
+
+    Termination:
+        Success.
     """
 
     seconds: Seconds = 6.0

@@ -1,4 +1,4 @@
-"""Pass through a goal with a target velocity."""
+"""Pass a goal with a target velocity."""
 
 from __future__ import annotations
 
@@ -29,13 +29,20 @@ from marl_airhockey.toolkit.rewards import tolerance
 
 @dataclass(frozen=True, kw_only=True)
 class ReachVelocity(GoalScenario):
-    """Task that rewards the best match so far of position and velocity together.
+    """Task of passing a goal with a target velocity.
 
-    As a running maximum it cannot be exploited; the goal lies ``margin`` inside the
-    reach, so that its velocity is feasible there in any direction. There is one pass:
-    the episode ends ``window`` after the paddle has entered the circle, so that
-    circling the goal with rising speed does not succeed. With goals="dict" it ends when
-    the goal is met, as the entry of a circle depends on the goal.
+    The reward is the best match of position and velocity so far. As a running maximum
+    it cannot be collected twice. There is one pass: the episode ends ``window`` seconds
+    after the paddle has entered the circle, so that circling the goal with rising speed
+    does not succeed. With ``goals="dict"`` the episode ends when the goal is met.
+
+    Start:
+        The paddle is near the home end. The goal is sampled from the workspace, at
+        least ``margin`` from its edges, so that the target velocity is feasible. The
+        target speed is between ``slow`` and ``fast``, in any direction.
+
+    Termination:
+        The end of the pass.
     """
 
     version: ClassVar[int] = 1

@@ -27,10 +27,16 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class Strike(Scenario):
-    """Task that rewards the best speed of the puck so far, and approaching it.
+    """Task of striking a resting puck so that it leaves fast, on a level table.
 
-    Success requires speed and distance in the same step: a pushed puck is not struck.
-    From rest a 0.7 m/s paddle gives at most 1.05 m/s.
+    Success requires speed and distance in the same step, so that pushing the puck does
+    not succeed. A paddle of 0.7 m/s gives a resting puck at most 1.05 m/s.
+
+    Start:
+        The paddle is near the home end and the puck rests in front of it.
+
+    Termination:
+        Success.
     """
 
     seconds: Seconds = 2.0

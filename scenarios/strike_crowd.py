@@ -1,4 +1,4 @@
-"""Strike a resting puck into a triangle of fifteen blocks and spread them."""
+"""Strike a resting puck into a triangle of fifteen blocks."""
 
 from __future__ import annotations
 
@@ -31,10 +31,16 @@ GAP = 0.004
 
 @dataclass(frozen=True, kw_only=True)
 class StrikeCrowd(Scenario):
-    """Task that rewards the largest summed displacement of the blocks, per metre.
+    """Task of striking a resting puck into a triangle of fifteen blocks.
 
-    Approaching the puck and its best upward speed after a touch are rewarded as
-    guidance.
+    The blocks must be displaced by ``spread`` in total, on a level table.
+
+    Start:
+        The paddle is near the home end and the puck rests in front of it. The triangle
+        of blocks is in the far half, up to 0.1 m from the middle.
+
+    Termination:
+        Success.
     """
 
     seconds: Seconds = 7.5

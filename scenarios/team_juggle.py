@@ -1,4 +1,4 @@
-"""Keep pucks up together, striking alternately."""
+"""Two players juggle a puck in alternation."""
 
 from __future__ import annotations
 
@@ -31,10 +31,17 @@ from marl_airhockey.toolkit import (
 
 @dataclass(frozen=True, kw_only=True)
 class TeamJuggle(Scenario):
-    """Game in which a hit that raises a puck by ``lift`` pays both 1, in alternation.
+    """Game in which two players juggle a puck in alternation.
 
-    The other seat must have made the last such hit. The seats are side by side at home,
-    each with its own half of the width; a puck that reaches home ends the episode.
+    A hit that raises the puck by ``lift`` rewards both players, if the other player
+    made the last such hit. The players are side by side at the home end, each with its
+    own half of the width.
+
+    Start:
+        The paddles are near the home end. The puck falls from the far half.
+
+    Termination:
+        A puck crosses the home line.
     """
 
     seconds: Seconds = 30.0

@@ -1,4 +1,4 @@
-"""Touch the falling puck, as often as it comes."""
+"""Touch a falling puck, as often as possible."""
 
 from __future__ import annotations
 
@@ -19,9 +19,13 @@ from marl_airhockey.toolkit.falling import FallingPuck
 
 @dataclass(frozen=True, kw_only=True)
 class Touch(FallingPuck):
-    """Task in which every distinct touch pays 1; losing the puck at home costs 1.
+    """Task of touching a falling puck, as often as possible.
 
-    Approaching the puck before the first touch is rewarded per metre.
+    Start:
+        The paddle is near the home end. The puck falls from the far half.
+
+    Termination:
+        The puck crosses the home line.
     """
 
     seconds: Seconds = 5.0

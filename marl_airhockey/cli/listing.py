@@ -49,8 +49,11 @@ def list_scenarios(
     if as_json:
         console.print_json(json.dumps(data))
         return
-    console.print(f"[bold]{scenario}[/bold]  {data['id'] or ''}\n{data['what']}\n")
-    console.print(f"[italic]success[/italic]: {data['success']}\n")
+    console.print(
+        f"[bold]{scenario}[/bold]  {data['id'] or ''}\n{data['description']}\n"
+    )
+    for title in ("start", "termination", "success"):
+        console.print(f"[italic]{title}[/italic]: {data[title]}\n")
     for title in ("seats", "observation", "reward", "options"):
         table = Table(*data[title][0], title=title, title_justify="left")
         above = ""

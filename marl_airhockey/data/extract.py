@@ -133,7 +133,9 @@ def _recorded(path: Path) -> tuple[Path, Rig | None, Array]:
     """
     recording, video = read_recording(path), path / FILM
     if not video.exists():
-        raise ValueError(f"{path}: it was recorded without a video (teleop --film)")
+        raise ValueError(
+            f"{path}: it was recorded without a video (teleop --record-video)"
+        )
     whole = [episode for episode in recording.episodes if len(episode)]
     if not whole or "device.moment" not in whole[0].columns:
         raise ValueError(f"{path}: no step of it has a picture")

@@ -177,7 +177,9 @@ def _camera(world: World) -> Any:
     from marl_airhockey.hardware.table.backend import RealBackend
 
     if not isinstance(world.backend, RealBackend):
-        raise ValueError("--film: only a real table has a camera; add --backend real")
+        raise ValueError(
+            "--record-video: only a real table has a camera; add --backend real"
+        )
     return world.backend.camera
 
 

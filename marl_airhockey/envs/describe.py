@@ -12,7 +12,12 @@ import numpy as np
 
 from marl_airhockey.build import build_world
 from marl_airhockey.discovery import gymnasium_id
-from marl_airhockey.envs.meanings import option_meanings, success_meaning, term_meanings
+from marl_airhockey.envs.meanings import (
+    description,
+    option_meanings,
+    success_meaning,
+    term_meanings,
+)
 from marl_airhockey.registry import (
     backend_names,
     driver_names,
@@ -91,16 +96,19 @@ def describe_profile(name: str) -> dict[str, Any]:
 
 
 def describe(name: str) -> dict[str, Any]:
-    """Return success, seats, observation, reward terms and options of a scenario."""
+    """Return all that a user has to know of a scenario, as plain data.
+
+    The class docstring by section, success, seats, observation, reward and options.
+    """
     scenario = find_scenario(name)
     layout = build_world(name, 1, autoreset=True, keywords={}).observer.layout
-    doc = (type(scenario).__doc__ or "").strip()
     terms, options = term_meanings(type(scenario)), option_meanings(type(scenario))
     return {
         "name": name,
         "id": _id(name),
-        "what": what(scenario) + "\n" + " ".join(doc.split()),
+        **description(type(scenario)),
         "success": success_meaning(type(scenario)),
+        "seconds": scenario.seconds,
         "seats": [
             {
                 "agent": f"paddle_{i}",
@@ -114,6 +122,7 @@ def describe(name: str) -> dict[str, Any]:
         "observation": [
             {
                 "label": label,
+                "unit": unit_of(label),
                 "low": round(float(low), 3),
                 "high": round(float(high), 3),
                 "meaning": " ".join(meaning.split()),
@@ -136,6 +145,20 @@ def describe(name: str) -> dict[str, Any]:
             for f in dataclasses.fields(scenario)
         ],
     }
+
+
+UNITS = {
+    **dict.fromkeys(("x", "y", "dx", "dy", "struck_at"), "m"),
+    **dict.fromkeys(("vx", "vy", "spin"), "m/s"),
+    **dict.fromkeys(("age", "held"), "s"),
+}
+"""Units of elements of observations, by the last word of their label"""
+
+
+def unit_of(label: str) -> str:
+    """Return the unit of an element of an observation; "" for flags and counts."""
+    word = label.rpartition(".")[2].rstrip("0123456789").rstrip("_")
+    return UNITS.get(word, "")
 
 
 def reward_terms(scenario: Scenario) -> list[str]:

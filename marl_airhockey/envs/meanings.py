@@ -15,6 +15,30 @@ TERM = re.compile(r"^ *(\w+): (.+?)(?=\n *\w+: |\n\n|\Z)", re.MULTILINE | re.DOT
 """Line of a docstring, ``name: meaning``, and those that it goes on in."""
 
 
+SECTION = re.compile(r"^(Start|Termination):\n((?:(?: {4}.*)?\n?)+)", re.MULTILINE)
+"""Section of the docstring of a scenario's class"""
+
+
+def description(kind: type[Scenario]) -> dict[str, str]:
+    """Return the docstring of a scenario's class, by section.
+
+    Returns:
+        ``description``, one paragraph a line, ``start`` and ``termination``; "" for
+        those that neither the class nor a class above it has. The description is
+        followed by that of a game that the class is derived from.
+    """
+    found = dict.fromkeys(("description", "start", "termination"), "")
+    for base in reversed(kind.__mro__):
+        if issubclass(base, Scenario) and base is not Scenario and base.__doc__:
+            text = inspect.cleandoc(base.__doc__)
+            found |= {k.lower(): _one_line(v) for k, v in SECTION.findall(text)}
+            paragraphs = SECTION.sub("", text).strip().split("\n\n")
+            if not text.startswith("Base of"):
+                lines = [*map(_one_line, paragraphs), found["description"]]
+                found["description"] = "\n".join(filter(None, lines))
+    return found
+
+
 def option_meanings(kind: type[Scenario]) -> dict[str, str]:
     """Return the docstrings of a scenario's fields, by name."""
     found: dict[str, str] = {}

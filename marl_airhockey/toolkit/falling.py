@@ -19,7 +19,7 @@ from marl_airhockey.types import Array, Memory
 
 @dataclass(frozen=True, kw_only=True)
 class FallingPuck(Scenario):
-    """Base of tasks in which a puck falls from the far half towards one seat at home.
+    """Base of tasks in which a puck falls from the far half towards one seat.
 
     The home side is a goal line. Memory ``gap`` (...) is the shortest distance of the
     paddle to the puck up to the first touch, m; subclasses continue it with

@@ -20,13 +20,14 @@ from marl_airhockey.types import Array, Memory
 
 @dataclass(frozen=True, kw_only=True)
 class Versus(Scenario):
-    """Game in which a goal pays a team 1 and costs the other 1.
+    """Game of two teams with a goal at either end.
 
-    The first team with ``goals_to_win`` goals, and more than the other, wins. After a
-    goal the puck is served from the centre toward the team that conceded it. Keeping it
-    within reach for ``possession`` seconds is a foul: a serve to the other side. A puck
-    at rest out of every reach is served again. A level game that the clock ends goes to
-    the team with more shots on goal, so who attacks wins it, not who passes time.
+    A goal gives its team a reward of 1 and the other team -1. The first team with
+    ``goals_to_win`` goals, and more than the other team, wins. If the time limit ends a
+    level game, the team with more shots on goal wins, so that attacking is worth more
+    than waiting. After a goal the puck is served from the centre to the team that
+    conceded it. A team that has the puck within reach for ``possession`` seconds loses
+    it to the other team. A puck that rests where nobody reaches it is served again.
     """
 
     announced = ("goals", "stopped", "serve")

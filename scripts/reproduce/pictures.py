@@ -43,6 +43,11 @@ def moment(name: str, width: int) -> Array:
     return draw(renderer.frame(), width if x > WIDE * y else round(0.54 * width))
 
 
+def save(path: Path, image: Array) -> None:
+    """Write an image (H, W, 3) into a PNG file."""
+    cv2.imwrite(str(path), cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+
+
 def sheet(pictures: list[Array], width: int) -> Array:
     """Return one picture of many in rows, on white."""
     rows = []
@@ -69,8 +74,7 @@ def main(
         alone = len(ah.make_scenario(name).scene.seats) == 1
         kinds["tasks" if alone else "games"].append(moment(name, width))
     for kind, pictures in kinds.items():
-        picture = cv2.cvtColor(sheet(pictures, width), cv2.COLOR_RGB2BGR)
-        cv2.imwrite(str(out / f"{kind}.png"), picture)
+        save(out / f"{kind}.png", sheet(pictures, width))
 
 
 if __name__ == "__main__":

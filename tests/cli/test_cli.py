@@ -36,8 +36,8 @@ def test_list_describes_one(scenario):
     labels = [row["label"] for row in data["observation"]]
     assert labels == list(env.observation_labels("paddle_0"))
     assert data["reward"]
-    assert data["what"]
-    assert data["success"]
+    for key in ("description", "start", "termination", "success"):
+        assert data[key], key
     for row in (*data["reward"], *data["options"], *data["observation"]):
         assert row["meaning"], f"{row} says nothing"
 

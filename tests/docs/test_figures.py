@@ -12,9 +12,11 @@ import pytest
 from marl_airhockey.evaluation.stats import interval
 from marl_airhockey.hardware.rig import LATEST
 from marl_airhockey.hardware.robot import MotionLimits
+from marl_airhockey.registry import scenario_names, zoo_names
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "docs/data"
+SPEED = DATA / "speed.json"
 COLUMNS = {
     "success": ("success", mean),
     "worst seed": ("success", min),
@@ -78,11 +80,10 @@ def seeds(task, profile, column):
 @pytest.mark.parametrize(
     ("page", "profile", "number", "titles"),
     [
-        ("README.md", "ideal", 0, ("success", "worst seed")),
-        ("docs/tasks.md", "ideal", 0, ("success", "worst seed")),
-        ("docs/tasks.md", "ur5e", 1, ("success", "worst seed")),
-        ("docs/tasks.md", "ideal", 0, ("sampled", "on pymunk")),
-        ("docs/tasks.md", "ur5e", 1, ("sampled", "on pymunk")),
+        ("docs/task_results.md", "ideal", 0, ("success", "worst seed")),
+        ("docs/task_results.md", "ur5e", 1, ("success", "worst seed")),
+        ("docs/task_results.md", "ideal", 0, ("sampled", "on pymunk")),
+        ("docs/task_results.md", "ur5e", 1, ("sampled", "on pymunk")),
     ],
 )
 def test_tables_of_tasks_are_the_means_of_their_rows(page, profile, number, titles):
@@ -98,14 +99,14 @@ def test_tables_of_tasks_are_the_means_of_their_rows(page, profile, number, titl
 
 @pytest.mark.parametrize(("profile", "number"), [("ideal", 0), ("ur5e", 1)])
 def test_intervals_of_tasks_count_each_episode_once(profile, number):
-    for row in table("docs/tasks.md", "task", "95 % interval", number=number):
+    for row in table("docs/task_results.md", "task", "95 % interval", number=number):
         low, high = interval(mean(seeds(row["task"], profile, "success")), 2000)
         assert row["95 % interval"] == f"{low:.3f} .. {high:.3f}"
 
 
 def test_the_zoo_is_that_of_its_rows():
     rows = {row["policy"]: row for row in rows_of("zoo.csv")}
-    shown = table("docs/tasks.md", "task", "`zoo/TASK`, ideal")
+    shown = table("docs/task_results.md", "task", "`zoo/TASK`, ideal")
     policies = []
     for line in shown:
         task, *cells = line.values()
@@ -125,17 +126,16 @@ def test_sentences_of_the_readme_are_those_of_the_rows():
     rows = [r for r in rows_of("tasks.csv") if r["profile"] == "ideal"]
     slowest = max(float(row["cpu_seconds_to_0.95"]) for row in rows)
     assert f"reaches 0.95 within {math.ceil(slowest)} CPU-seconds" in text
-    arm = {
-        task: mean(seeds(task, "ideal", "arm")) for task in {r["task"] for r in rows}
-    }
-    worst = min(arm, key=arm.get)
-    best = max(arm.values())
-    assert f"success {arm[worst]:.3f} ({worst}) to {best:.3f} in the profile" in text
+    rates = [r["env_steps_per_cpu_s"] for r in json.loads(SPEED.read_text())]
+    assert f"up to {max(rates) / 1e6:.0f} million environment steps" in text
+    assert f"{len(rows_of('datasets.csv'))} datasets" in text
+    policies = {policy.partition("_ur5e")[0] for policy in zoo_names()}
+    assert policies >= {f"zoo/{name}" for name in scenario_names()}
 
 
 def test_the_table_of_speed_is_that_of_its_run():
-    found = json.loads((DATA / "speed.json").read_text())
-    shown = table("README.md", "ours / this")
+    found = json.loads(SPEED.read_text())
+    shown = table("docs/speed.md", "ours / this")
     for row, run in zip(shown, found, strict=True):
         _, *cells = [cell.strip("*") for cell in row.values()]
         rates = [run["env_steps_per_cpu_s"], run["agent_steps_per_cpu_s"]]
@@ -148,39 +148,11 @@ def test_the_table_of_speed_is_that_of_its_run():
 def test_blind_columns_are_those_of_the_search():
     rows = {(r["task"], r["profile"]): r["success"] for r in rows_of("blind.csv")}
     for page, profile, number in (
-        ("README.md", "ideal", 0),
-        ("docs/tasks.md", "ideal", 0),
-        ("docs/tasks.md", "ur5e", 1),
+        ("docs/task_results.md", "ideal", 0),
+        ("docs/task_results.md", "ur5e", 1),
     ):
         for row in table(page, "task", "blind", number=number):
             assert row["blind"] == rows.get((row["task"], profile), "-")
-
-
-def test_what_changed_with_version_1_is_that_of_its_rows():
-    before = {
-        row["task"]: row
-        for row in rows_of("tasks_before.csv")
-        if row["profile"] == "ideal"
-    }
-    now = {r["task"]: r for r in rows_of("blind.csv") if r["profile"] == "ideal"}
-    shown = table("docs/tasks.md", "blind before", "trained now")
-    assert {row["task"] for row in shown} == set(before) == CHANGED
-    for row in shown:
-        task = row["task"]
-        assert row["blind before"] == before[task]["blind"]
-        assert row["blind now"] == now[task]["success"]
-        assert row["trained before"] == before[task]["trained"]
-        expected = mean(seeds(task, "ideal", "success"))
-        assert float(row["trained now"]) == pytest.approx(expected, abs=6e-4)
-
-
-def test_the_cost_of_sensed_contacts_is_that_of_the_rows():
-    text = " ".join((ROOT / "docs/tasks.md").read_text().split())
-    known = [row for row in rows_of("tasks_before.csv") if not row["blind"]]
-    assert len(known) == 5
-    for row in known:
-        now = mean(seeds(row["task"], "ur5e", "success"))
-        assert f"{row['task']} {row['trained']} before, {now:.3f} now" in text
 
 
 def test_answer_times_are_those_that_were_measured():
@@ -247,7 +219,7 @@ def test_ladders_have_the_ratings_of_their_files(game):
 
 def test_blind_controllers_are_those_of_their_rows():
     rows = {(row["task"], row["profile"]): row for row in rows_of("blind.csv")}
-    shown = table("docs/tasks.md", "blind, ideal")
+    shown = table("docs/task_results.md", "blind, ideal")
     assert len(shown) == 5
     for row in shown:
         for profile in ("ideal", "ur5e"):

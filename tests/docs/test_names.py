@@ -6,10 +6,10 @@ import re
 import shlex
 from dataclasses import fields
 from functools import cache
-from pathlib import Path
 
 import pytest
 import typer.main
+from written import PAGES, ROOT
 
 import marl_airhockey as ah
 from marl_airhockey.cli.main import app
@@ -20,11 +20,6 @@ from marl_airhockey.sim.contracts.observable import OBSERVE
 from marl_airhockey.sim.core.parameters import PARAMETERS
 from marl_airhockey.sim.world.keywords import Keywords
 
-ROOT = Path(__file__).parents[2]
-PAGES = [
-    *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")),
-    *sorted((ROOT / "docs").glob("*.md")),
-]
 CODE = ("marl_airhockey", "scenarios", "drivers", "scripts", "tests")
 SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 COMMAND = re.compile(
@@ -212,10 +207,10 @@ def test_every_command_and_option_exists(page):
 
 def test_every_keyword_of_an_environment_is_on_its_page():
     text = (ROOT / "docs/environments.md").read_text()
-    section = text.split("## Keywords of all")[1].split("\n## ")[0]
-    named = set(SPAN.findall(section))
+    section = text.split("## Keywords")[1].split("\n## ")[0]
+    named = set(re.findall(r"^\| `([a-z_]+)` \|", section, re.MULTILINE))
     keywords = {*Keywords.__annotations__, "render_mode", "viewpoint"}
-    assert keywords == {name for name in named if re.fullmatch("[a-z_]+", name)}
+    assert keywords == named
 
 
 @pytest.mark.parametrize("config", [PPOConfig, HindsightConfig, OfflineConfig])

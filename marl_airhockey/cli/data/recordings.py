@@ -39,7 +39,10 @@ def record(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the first episode.")] = 0,
     film: Annotated[
-        bool, typer.Option("--film", help="Keep a real table's pictures beside it.")
+        bool,
+        typer.Option(
+            "--record-video", help="Record the video of a real table's camera."
+        ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -253,7 +253,7 @@ class RealBackend(LiveBackend):
             "fault": self.robot.fault.label,
             "asked": [round(float(x), 4) for x in self._commanded],
             "sent": [round(status.sent_vx, 4), round(status.sent_vy, 4)],
-            "sent_place": [round(status.sent_x, 4), round(status.sent_y, 4)],
+            "sent_position": [round(status.sent_x, 4), round(status.sent_y, 4)],
             "height_mm": round(1e3 * status.z, 2),
             "force": round(status.force, 1),
             "joints": [round(angle, 5) for angle in status.joints],
