@@ -1,4 +1,4 @@
-"""Innovations: how far sightings of a puck are from where its filter predicts them."""
+"""Innovations: distances of a puck's sightings from the predictions of its filter."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ import numpy as np
 from marl_airhockey.types import Array
 
 SKIPPED = 8
-"""Number of first sightings, whose velocity is not known yet"""
+"""Number of ignored first sightings, as the velocity is not known yet."""
 WEIGHT = 0.1
-"""Weight of the newest innovation in their mean"""
-LARGEST = 0.03
-"""Innovation above which a larger one counts no more, m, so that one wrong sighting is
-not enough: it adds 3 mm to the mean"""
+"""Weight of the newest innovation in their mean."""
+LARGEST, MULTIPLE = 0.03, 20.0
+"""Largest value that an innovation counts with, m, and as a multiple of the usual one.
+One wrong sighting then adds at most 3 mm, or twice the usual innovation, to the mean,
+which is not enough."""
 USUAL = 0.001
-"""First value of the usual innovation, m"""
+"""First value of the usual innovation, m."""
 LEARNING = 0.02
-"""Share by which the usual innovation changes with each sighting"""
+"""Share by which the usual innovation changes with each sighting."""
 LEAST, FACTOR = 0.005, 4.0
 """Mean innovation that is too large, m, and as a multiple of the usual one. In the
 virtual lab the mean stays below 3 mm; it reaches 7 mm when the camera is moved by
@@ -31,26 +32,27 @@ class Innovations:
 
     def __init__(self) -> None:
         self.usual = USUAL
-        """Usual innovation, m"""
+        """Usual innovation, m."""
         self.restart()
 
     def restart(self) -> None:
         """Begin an episode."""
         self._count, self.mean = 0, self.usual
-        """Mean of the last innovations, m"""
+        """Mean of the last innovations, m."""
 
     def add(self, innovation: Array) -> None:
-        """Take an innovation (2,), m."""
+        """Add an innovation (2,), m."""
         self._count += 1
         if self._count <= SKIPPED:
             return
         size = float(np.linalg.norm(innovation))
         self.usual *= 1.0 + LEARNING * (1.0 if size > self.usual else -1.0)
-        self.mean += WEIGHT * (min(size, LARGEST) - self.mean)
+        largest = max(LARGEST, MULTIPLE * self.usual)
+        self.mean += WEIGHT * (min(size, largest) - self.mean)
 
     @property
     def trouble(self) -> str:
-        """Reason why the sightings cannot be of the one puck; "" if they can be."""
+        """Reason why the sightings cannot be those of one puck; "" if they can be."""
         if self.mean <= max(LEAST, FACTOR * self.usual):
             return ""
         return (

@@ -38,7 +38,7 @@ def noise(k):
 
 @pytest.mark.parametrize(
     ("every", "words", "share"),
-    [(1, "", 1.0), (2, "10 of 20 pictures repeat", 0.5), (10**6, "same picture", 0.1)],
+    [(1, "", 1.0), (2, "10 of 20 frames repeat", 0.5), (10**6, "same frame", 0.1)],
 )
 def test_repeated_pictures_are_noticed_and_not_searched(every, words, share):
     count = iter(range(10**6))
