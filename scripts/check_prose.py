@@ -1,11 +1,9 @@
 """Check the prose of pages, docstrings, command help, error messages and comments.
 
-    python scripts/check_prose.py                  # fail if a folder exceeds its limits
-    python scripts/check_prose.py --show docs      # list the findings under a path
-    python scripts/check_prose.py --lower          # lower the limits to today's counts
+    python scripts/check_prose.py           # list all findings
+    python scripts/check_prose.py docs      # list those of paths that begin so
 
-The rules are those of CONTRIBUTING.md. `prose.toml` lists the words to avoid and, for
-each folder and rule, the largest number of findings. A limit can only be lowered.
+The rules are those of CONTRIBUTING.md. `prose.toml` lists the words to avoid.
 """
 
 from __future__ import annotations
@@ -13,7 +11,6 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -47,11 +44,6 @@ class Finding(NamedTuple):
     line: int
     rule: str
     text: str
-
-    @property
-    def folder(self) -> str:
-        """Folder that the limit belongs to: a page, or up to two levels of a path."""
-        return "/".join(self.path.split("/")[:-1][:2]) or self.path
 
 
 def word_findings(text: Text, words: dict[re.Pattern[str], str]) -> Iterator[str]:
@@ -124,42 +116,18 @@ def words_of(given: dict[str, str]) -> dict[re.Pattern[str], str]:
     return {re.compile(rf"\b(?:{word})\b", flags): to for word, to in given.items()}
 
 
-def counts_of(found: list[Finding]) -> dict[str, int]:
-    """Return the number of findings by folder and rule."""
-    return dict(sorted(Counter(f"{f.folder} {f.rule}" for f in found).items()))
-
-
-def worse(counts: dict[str, int], limits: dict[str, int]) -> dict[str, int]:
-    """Return the counts that exceed their limit."""
-    return {key: n for key, n in counts.items() if n > limits.get(key, 0)}
-
-
 def main(
-    show: Annotated[
-        str, typer.Option(help="Path whose findings are listed; '.' for all of them.")
-    ] = "",
-    rule: Annotated[str, typer.Option(help="Rule whose findings are listed.")] = "",
-    lower: Annotated[
-        bool, typer.Option(help="Lower the limits to today's counts.")
-    ] = False,
+    paths: Annotated[
+        list[str] | None, typer.Argument(help="Start of the paths to list. All files.")
+    ] = None,
 ) -> None:
-    """Compare the number of findings of each folder and rule with its limit."""
-    rules = tomllib.loads(RULES.read_text())
-    found = list(findings(ROOT, words_of(rules["words"])))
-    for each in found if show else []:
-        shown = each.path.startswith(show.removeprefix("."))
-        if shown and rule in ("", each.rule):
-            print(f"{each.path}:{each.line}: {each.rule}: {each.text}")
-    counts = counts_of(found)
-    if above := worse(counts, rules["limits"]):
-        for key, count in above.items():
-            print(f"{key}: {count} findings, {rules['limits'].get(key, 0)} are allowed")
-        print("python scripts/check_prose.py --show FOLDER lists them")
-        sys.exit(1)
-    if lower:
-        head = RULES.read_text().partition("[limits]")[0]
-        lines = [f'"{key}" = {count}' for key, count in counts.items()]
-        RULES.write_text("\n".join([head + "[limits]", *lines]) + "\n")
+    """List the findings; exit with status 1 if there are any."""
+    words = words_of(tomllib.loads(RULES.read_text())["words"])
+    chosen = tuple(paths or [""])
+    found = [f for f in findings(ROOT, words) if f.path.startswith(chosen)]
+    for each in found:
+        print(f"{each.path}:{each.line}: {each.rule}: {each.text}")
+    sys.exit(bool(found))
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ def without_code(text: str) -> str:
     text = re.sub(r"``[^`]+``|`[^`]+`", lambda m: "`x`" + "\n" * m[0].count("\n"), text)
     text = re.sub(r"\]\([^)]*\)", "]", text)
     return re.sub(
-        r"^(?: {4,}|>>>|\.\.\.).*$|https?://\S+", "", text, flags=re.MULTILINE
+        r"^(?: {4,}|>>>|\.\.\.|:::).*$|https?://\S+", "", text, flags=re.MULTILINE
     )
 
 
@@ -62,11 +62,12 @@ def _paragraphs(page: str) -> Iterator[Text]:
 
 
 def _texts_at(node: ast.AST) -> Iterator[Text]:
-    """Yield the docstring, help or message that begins at a node of a program."""
+    """Yield the docstring, help or message that begins at a syntax node."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         if isinstance(node.value.value, str):
             clean = inspect.cleandoc(node.value.value)
-            prose = re.sub(r"^    ([*\w, ]+: )", r"\1", clean, flags=re.MULTILINE)
+            # Names of arguments are code.
+            prose = re.sub(r"^    [*\w, ]+: ", "", clean, flags=re.MULTILINE)
             yield Text("docstring", node.lineno, without_code(prose))
             yield from _arguments(clean, node.lineno)
     elif isinstance(node, ast.keyword) and node.arg == "help":
@@ -77,9 +78,13 @@ def _texts_at(node: ast.AST) -> Iterator[Text]:
 
 
 def _words(node: ast.AST) -> str:
-    """Return the constant strings under a node, joined."""
-    parts = (n.value for n in ast.walk(node) if isinstance(n, ast.Constant))
-    return " ".join(part for part in parts if isinstance(part, str))
+    """Return the constant strings under a node, joined; values in them are "x"."""
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, str) else ""
+    if isinstance(node, ast.FormattedValue):
+        return "x"
+    joint = "" if isinstance(node, ast.JoinedStr) else " "
+    return joint.join(filter(None, map(_words, ast.iter_child_nodes(node))))
 
 
 def _arguments(docstring: str, line: int) -> Iterator[Text]:

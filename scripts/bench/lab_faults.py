@@ -1,16 +1,19 @@
-"""Measure what an episode does when devices fail: each fault of the lab, and pairs.
+"""Measure the end of an episode when devices fail: each fault of the lab, and pairs.
 
     python scripts/bench/lab_faults.py --out docs/data/lab_faults.json
 
-The learned juggler plays through camera and arm; after a second one or two faults are
-switched on; those that others have reported, see
-`tests/hardware/lab/test_fault_atlas.py`, are left out. Printed are the reason with
-which the episode ends, the time until then and until the true paddle rests for good
-(below 0.01 m/s), and how far it moved on after the episode's end. "plays on" is for
-what ends no episode within the time that is listened.
-It takes about 25 minutes, with ``--alone`` four, in real time: nothing else should run
-meanwhile. Faults whose rows are in the file are not measured again, so the script can
-be stopped and started; ``--summary`` prints the pairs of the file by reason.
+A trained policy juggles through camera and arm. After a second one or two faults are
+switched on. Faults that were reported by others are omitted, see
+`tests/hardware/lab/test_fault_atlas.py`. The script prints
+
+* the reason with which the episode ends, or ``continues`` if no end is observed,
+* the time until then,
+* the time until the true paddle is at rest permanently (below 0.01 m/s),
+* the distance that the paddle moves after the end of the episode.
+
+It takes about 25 minutes, or four with ``--alone``, in real time. Nothing else should
+run at the same time. Faults whose rows are in the file are not measured again, so the
+script can be interrupted. ``--summary`` prints the pairs of the file by reason.
 """
 
 from __future__ import annotations
@@ -38,39 +41,40 @@ from marl_airhockey.sim.world.world import World
 from marl_airhockey.types import Array
 
 BEFORE, LISTEN = 20, 80
-"""Control steps before a fault, and the most after it"""
+"""Number of control steps before a fault, and largest number after it."""
 REST = 2.0
-"""Longest time for which an ended episode's paddle is listened to, s"""
+"""Longest time for which the paddle is observed after the end of an episode, s."""
 SETTLE = 1.0
-"""Time after the end of a fault until the next episode, in which a lifted paddle comes
-down, s"""
+"""Time from the end of a fault to the next episode, in which a lifted paddle comes
+down, s."""
 STILL = 0.01
-"""Speed below which the paddle rests, m/s"""
+"""Speed below which the paddle is at rest, m/s."""
 QUIET = "local_control"
-"""Fault that stops no program that runs"""
+"""Fault that does not stop the running URScript of the controller."""
 
 
 class Outcome(NamedTuple):
     """Outcome of an episode with faults."""
 
     reason: str
-    """Reason of its end; "" if it plays on"""
+    """Reason of the end; "" if the episode continues."""
     ended_s: float
-    """Time from the fault to that end; nan if it plays on"""
+    """Time from the fault to the end, s; nan if the episode continues."""
     rest_s: float
-    """Time from the fault until the paddle rests for good; nan if it does not"""
+    """Time from the fault until the paddle is at rest permanently, s; nan if it is
+    not."""
     moved_m: float
-    """Distance by which the paddle moved after the end"""
+    """Distance that the paddle moves after the end, m."""
 
 
 def paddle_of(lab: Lab) -> Array:
-    """Return (5,) time, s, position, m, and velocity, m/s, of the true paddle."""
+    """Return time, s, position, m, and velocity, m/s, of the true paddle, (5,)."""
     truth = lab.ask({"do": "truth"})
     return np.array([truth["time"], *np.array(truth["paddle"])[[0, 1, 3, 4]]])
 
 
 def play(lab: Lab, world: World, faults: tuple[str, ...], seed: int) -> Outcome | None:
-    """Return the outcome of an episode; None if it ended before the faults could."""
+    """Return the outcome of an episode; None if it ends before the faults."""
     no_actions, rows = np.zeros((1, 0, 2)), []
     world.reset(seed)
     for _ in range(BEFORE):
@@ -124,7 +128,7 @@ def measure(
 
 def show(row: dict[str, object]) -> None:
     """Print a row of the table."""
-    cells = [str(row["faults"]), str(row["reason"] or "plays on")]
+    cells = [str(row["faults"]), str(row["reason"] or "continues")]
     for name, scale in (("ended_s", 1e3), ("rest_s", 1e3), ("moved_m", 1e3)):
         value = row[name]
         cells.append("" if value is None else f"{scale * float(str(value)):.0f}")
@@ -132,12 +136,12 @@ def show(row: dict[str, object]) -> None:
 
 
 def summary_of(rows: list[dict[str, Any]]) -> list[dict[str, str]]:
-    """Return the number of pairs for each reason of an end, and their worst numbers."""
+    """Return the number of pairs for each reason of an end, and their worst values."""
     pairs: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
         if "+" in row["faults"]:
             words = row["reason"].split(";")[0]
-            reason = re.sub(r"[\d.]*\d", "N", words) or "plays on"
+            reason = re.sub(r"[\d.]*\d", "N", words) or "continues"
             pairs.setdefault(reason, []).append(row)
 
     def worst(found: list[dict[str, Any]], column: str) -> str:
@@ -166,9 +170,13 @@ def print_summary(rows: list[dict[str, Any]]) -> None:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--alone", action="store_true", help="leave out pairs")
-    parser.add_argument("--out", type=Path, help="file for the rows, JSON")
-    parser.add_argument("--summary", type=Path, help="print the pairs of this file")
+    parser.add_argument(
+        "--alone", action="store_true", help="Measure no pairs of faults."
+    )
+    parser.add_argument("--out", type=Path, help="JSON file of the rows.")
+    parser.add_argument(
+        "--summary", type=Path, help="File whose pairs are printed instead."
+    )
     given = parser.parse_args()
     if given.summary:
         print_summary(json.loads(given.summary.read_text()))

@@ -9,30 +9,40 @@ from pathlib import Path
 
 import typer
 
-from marl_airhockey.evaluation.challenge import PROFILES
+from marl_airhockey.evaluation.challenge import FIELD, PROFILES
 from marl_airhockey.evaluation.challenge_report import PROTOCOL, ChallengeReport
 
 DOCS = Path(__file__).parents[2] / "docs"
 PARTS = (*PROFILES, "tasks", "duel")
 HEAD = f"""# Leaderboard
 
-`airhockey challenge POLICY` plays the ten tasks in three profiles, whose physics and
-senses are drawn anew for each episode, and duels against a fixed field, and writes a
-card. What is not played counts as 0. Nothing is signed: a card names the version and
-the SHA-256 of each policy's file, so that everybody can play it again.
+This page compares policies by a fixed protocol, number {PROTOCOL}.
+`airhockey challenge POLICY` plays the protocol and writes a card with the results.
 
-To add yours: run the command with your policies in a folder (`juggle.npz`,
-`juggle_ur5e.npz` ..., `duel.npz`), copy `card.json` to `docs/leaderboard/<name>.json`,
-run `python scripts/reproduce/leaderboard.py`, and open a pull request with both files
-and a link to the policies.
+- Tasks: the ten tasks in each of the profiles {", ".join(PROFILES)}.
+  In ur5e and gantry, physics and sensing are sampled for each episode.
+- Duels: games against {", ".join(FIELD)}.
+- A task or game without a policy counts as 0.
+- A card contains the version of the library and the SHA-256 of each policy file, so
+  that anyone can measure the policies again. It is not signed.
 
-Protocol {PROTOCOL}; means with 95 % intervals. {", ".join(PROFILES)}: success in the
-ten tasks in the profile; tasks: in all; duel: share of won games.
+All values are means with 95 % intervals. The columns with the name of a profile show
+the success in the ten tasks in that profile, and "tasks" the success in all profiles.
+"duel" is the share of won games, in which a draw counts half.
+"""
+TAIL = """
+## Add your policies
+
+1. Put the policies into a folder: `juggle.npz`, `juggle_ur5e.npz`, ..., `duel.npz`.
+2. Run `airhockey challenge FOLDER`.
+3. Copy `card.json` to `docs/leaderboard/<name>.json`.
+4. Run `python scripts/reproduce/leaderboard.py`.
+5. Open a pull request with both files and a link to the policies.
 """
 
 
 def main() -> None:
-    """Read the cards, write the page."""
+    """Read the cards and write the page."""
     cards = {
         path: ChallengeReport.from_json(path.read_text())
         for path in sorted((DOCS / "leaderboard").glob("*.json"))
@@ -46,7 +56,7 @@ def main() -> None:
         ]
         name = f"[{card.name}](leaderboard/{path.name})"
         lines.append(f"| {name} | {' | '.join(shares)} |")
-    (DOCS / "leaderboard.md").write_text("\n".join(lines) + "\n")
+    (DOCS / "leaderboard.md").write_text("\n".join([*lines, TAIL]))
 
 
 if __name__ == "__main__":

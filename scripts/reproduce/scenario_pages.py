@@ -124,7 +124,7 @@ def page(name: str) -> str:
         "",
         f"![{name.replace('_', ' ')}, played by a script](images/{name}.png)",
         "",
-        *table(("", ""), facts),
+        *table(("property", "value"), facts),
         "",
         "## Start",
         "",

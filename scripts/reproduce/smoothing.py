@@ -1,16 +1,16 @@
-"""Compare filters of commands: what they cost a policy, what they spare the arm.
+"""Compare filters of commands: their cost for a policy and their effect on the arm.
 
     python scripts/reproduce/smoothing.py
 
-A learned policy plays its task while its paddle is the tool of an emulated arm: its
-actions go through a filter (`hardware/robot/filters.py`), the driver and the emulated
-controller, in emulated time. Measured are the success, the acceleration and the jerk of
-the tool as it truly moved, over 10 ms, and how often the arm ended
-in a protective stop, which fails the episode. "chatter" is the same policy with each
-component of its actions rounded to -1 or 1, a bad example on purpose. Limits "none"
-leave the filters alone; "authors" are the constants of the authors' robot code.
+A trained policy plays its task, and its paddle is the tool of an emulated arm. Its
+actions pass through a filter (`hardware/robot/filters.py`), the robot client and the
+emulated controller, in emulated time. The script measures the success, the acceleration
+and the jerk of the true tool over 10 ms, and the number of protective stops of the arm.
+A stop fails the episode. ``chatter`` is the same policy with each component of its
+actions rounded to -1 or 1 (bang-bang actions), a bad example on purpose. The limits
+"none" leave only the filters. "authors" are the constants of the authors' robot code.
 
-Each cell that ends adds a row to the CSV; one whose row is there is not played again.
+A finished cell adds a row to the CSV file. A cell that has a row is not played again.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ LIMITS = {
     "authors": AUTHORS,
 }
 CELLS = (
-    *itertools.product(POLICIES, ("policy", "chatter"), ("ur5e", "none"), FILTERS),
-    *itertools.product(POLICIES, ("policy", "chatter"), ("authors",), FILTERS[:1]),
+    *itertools.product(POLICIES, ("policy", "bang-bang"), ("ur5e", "none"), FILTERS),
+    *itertools.product(POLICIES, ("policy", "bang-bang"), ("authors",), FILTERS[:1]),
 )
 SAMPLE = 0.01
-"""Time over which motion is measured, s"""
+"""Time over which the movement is measured, s."""
 SETUP = LabSetup(table="standard")
 COLUMNS = (
     *("task", "commands", "limits", "filter", "time_s", "episodes", "success", "low"),
@@ -68,9 +68,9 @@ class EmulatedPlayer(Driver):
     """Policy whose paddle is the tool of an emulated arm, in emulated time.
 
     Args:
-        policy: Policy.
-        chatters: Whether each component of its actions is rounded to -1 or 1.
-        preset: Limits and settings.
+        policy: Policy to play with.
+        chatters: True to round each component of its actions to -1 or 1.
+        preset: Limits and settings of the robot client.
         smoothing: Filter of the commands.
     """
 
@@ -84,9 +84,9 @@ class EmulatedPlayer(Driver):
         self._preset, self._smoothing = preset, smoothing
         self.observe = policy.observe
         self.velocities: list[Array] = []
-        """Velocities of the tool in each episode, every `SAMPLE`, (N, 2) m/s"""
+        """Velocities of the tool in each episode, every `SAMPLE`, m/s, (N, 2)."""
         self.stops = 0
-        """Number of protective stops"""
+        """Number of protective stops."""
         self.robot = self._start()
 
     def _start(self) -> EmulatedRobot:
@@ -107,7 +107,7 @@ class EmulatedPlayer(Driver):
     def act(
         self, view: View, memory: dict[str, Array]
     ) -> tuple[Array, dict[str, Array]]:
-        """Send an action to the arm and let a control step pass."""
+        """Send an action to the arm and advance by a control step."""
         action, memory = self._policy.act(view, memory)
         if self._chatters:
             action = np.where(action < 0.0, -1.0, 1.0)
@@ -118,7 +118,7 @@ class EmulatedPlayer(Driver):
         return action, memory
 
     def measured(self) -> PrescribedMotion:
-        """Return (1, 4) the paddle, as the arm reports it."""
+        """Return position, m, and velocity, m/s, that the arm reports, (1, 4)."""
         now = self.robot.get_observation()
         return np.array([[now.x, now.y, now.vx, now.vy]])
 
@@ -128,13 +128,13 @@ class EmulatedPlayer(Driver):
         return self.robot.state in (DriverState.HOLD, DriverState.FAULT)
 
     def end(self) -> None:
-        """Keep what an episode measured."""
+        """Save the measurements of an episode."""
         self.velocities.append(np.array(self._moved))
         self.stops += self.stopped
 
 
 def play(task: str, player: EmulatedPlayer, episodes: int) -> int:
-    """Return the number of successes; an episode in which the arm stops is none."""
+    """Return the number of successes; an episode with a stop is a failure."""
     world = build_driven_world(player, task, 1, {"profile": "ur5e"})
     successes = 0
     for episode in range(episodes):
@@ -155,7 +155,7 @@ def measure(
 ) -> dict[str, str | int]:
     """Return the row of a cell."""
     policy = load_policy(POLICIES[task])
-    chatters = commands == "chatter"
+    chatters = commands == "bang-bang"
     player = EmulatedPlayer(policy, chatters, LIMITS[limits], smoothing)
     successes = play(task, player, episodes)
     low, high = interval(successes / episodes, episodes)
@@ -180,26 +180,28 @@ BY_CELL = {
     (task, commands, limits, smoothing.name, f"{smoothing.time:g}"): smoothing
     for task, commands, limits, smoothing in CELLS
 }
-"""Filter of each cell, by the values of its first columns"""
+"""Filter of each cell, by the values of the first columns."""
 BOOK = Book(DATA / "smoothing.csv", COLUMNS[:5])
 
 
 def row_of(
     episodes: int, task: str, commands: str, limits: str, name: str, time: str
 ) -> Row:
-    """Return the row of a cell, which the values of its first columns name."""
+    """Return the row of the cell with these values of the first columns."""
     cell = task, commands, limits, name, time
     found = measure(task, commands, limits, BY_CELL[cell], episodes)
     return dict(zip(COLUMNS[:5], cell, strict=True)) | found
 
 
 def main(
-    episodes: Annotated[int, typer.Option(help="Episodes of each cell.")] = 50,
-    jobs: Annotated[int, typer.Option(help="Cells at a time.")] = 2,
+    episodes: Annotated[
+        int, typer.Option(help="Number of episodes of each cell.")
+    ] = 50,
+    jobs: Annotated[int, typer.Option(help="Number of cells at a time.")] = 2,
     again: Again = False,
     rows: RowsFile = None,
 ) -> None:
-    """Play the cells whose rows are missing."""
+    """Play the cells that have no row."""
     book = BOOK.at(rows)
     book.fill(book.missing([*BY_CELL], again), partial(row_of, episodes), jobs)
 

@@ -157,10 +157,10 @@ def test_blind_columns_are_those_of_the_search():
 
 def test_answer_times_are_those_that_were_measured():
     rows = {f"`{row['profile']}`": row for row in rows_of("answer_times.csv")}
-    shown = table("docs/physics.md", "profile", "answer time")
+    shown = table("docs/profiles.md", "profile", "end-to-end latency")
     assert len(shown) == len(rows)
     for row in shown:
-        assert row["answer time"] == f"{rows[row['profile']]['answer_ms']} ms"
+        assert row["end-to-end latency"] == f"{rows[row['profile']]['answer_ms']} ms"
 
 
 def test_table_of_the_arm_is_the_same():
@@ -176,8 +176,10 @@ def test_table_of_the_arm_is_the_same():
 
 def test_tables_of_offline_learning_are_those_of_their_rows():
     made = script("reproduce/offline_tables.py")["tables_of"](rows_of("offline.csv"))
-    shown = [rows for head, rows in tables("docs/offline.md") if head[0] == "task"]
-    heads = [head for head, _ in tables("docs/offline.md") if head[0] == "task"]
+    shown = [
+        rows for head, rows in tables("docs/offline_results.md") if head[0] == "task"
+    ]
+    heads = [head for head, _ in tables("docs/offline_results.md") if head[0] == "task"]
     assert [[head, *rows] for head, rows in zip(heads, shown, strict=True)] == [
         *made.values()
     ]
@@ -185,14 +187,14 @@ def test_tables_of_offline_learning_are_those_of_their_rows():
 
 def test_what_the_paper_announces_is_that_of_its_rows():
     header, *made = script("reproduce/announced.py")["table"]()
-    shown = table("docs/offline.md", "study", "case")
+    shown = table("docs/offline_results.md", "study", "case")
     assert shown == [dict(zip(header, line, strict=True)) for line in made]
 
 
 def test_the_cost_of_learning_is_that_of_all_rows():
     names = ("offline.csv", "announced.csv", "hindsight.csv")
     spent = sum(float(r["cpu_minutes"]) for name in names for r in rows_of(name))
-    text = (ROOT / "docs/offline.md").read_text()
+    text = (ROOT / "docs/offline_results.md").read_text()
     assert f" {spent / 60:.1f} CPU-hours of learning in all" in text
 
 
@@ -209,7 +211,8 @@ def test_hindsight_is_that_of_its_rows():
 
 @pytest.mark.parametrize("game", ["duel", "doubles", "free_for_all"])
 def test_ladders_have_the_ratings_of_their_files(game):
-    header, rows = next(t for t in tables("docs/games.md") if t[0][0] == "level")
+    found = tables("docs/game_results.md")
+    header, rows = next(t for t in found if t[0][0] == "level")
     column = header.index(f"{game}: steps") + 1
     ladder = rows_of(f"{game}_ladder.csv")
     assert len(ladder) == len(rows)
@@ -251,7 +254,7 @@ def test_stops_are_those_of_their_rows(name):
     rows = json.loads((DATA / name).read_text())
     found = {row.get("case") or row["faults"]: row for row in rows}
     pairs = [row for case, row in found.items() if "+" in case]
-    lines = table("docs/robot.md", *STOPS[name])
+    lines = table("docs/robot_results.md", *STOPS[name])
     # The pairs have one line.
     assert len(lines) == len(found) - len(pairs) + bool(pairs)
     for shown in lines:
@@ -281,7 +284,7 @@ def test_the_long_run_is_that_of_its_row():
         sum(count for name, count in changes if name.startswith(kind))
         for kind in ("FAULT", "HOLD")
     )
-    (shown,) = table("docs/robot.md", "emulated hours", "leaps")
+    (shown,) = table("docs/robot_results.md", "emulated hours", "leaps")
     assert list(shown.values()) == [
         f"{row['hours']:g}",
         f"{row['cycles']:,}",
@@ -298,11 +301,11 @@ def test_the_long_run_is_that_of_its_row():
 def test_faults_of_the_lab_are_those_of_their_rows():
     rows = json.loads((DATA / "lab_faults.json").read_text())
     alone = [row for row in rows if "+" not in row["faults"]]
-    shown = table("docs/lab.md", "fault", "reason of the end")
+    shown = table("docs/robot_results.md", "fault", "reason of the end")
     titles = "episode ends, ms", "at rest, ms", "moved on, mm"
     for line, row in zip(shown, alone, strict=True):
         assert line["fault"] == f"`{row['faults']}`"
-        assert line["reason of the end"] == (row["reason"] or "plays on")
+        assert line["reason of the end"] == (row["reason"] or "continues")
         columns = "ended_s", "rest_s", "moved_m"
         for title, column in zip(titles, columns, strict=True):
             value = row[column]
@@ -312,7 +315,7 @@ def test_faults_of_the_lab_are_those_of_their_rows():
 def test_pairs_of_faults_are_those_of_their_rows():
     rows = json.loads((DATA / "lab_faults.json").read_text())
     assert sum("+" in row["faults"] for row in rows) == 136
-    shown = table("docs/lab.md", "reason of the end", "pairs")
+    shown = table("docs/robot_results.md", "reason of the end", "pairs")
     assert shown == script("bench/lab_faults.py")["summary_of"](rows)
 
 
@@ -329,7 +332,7 @@ def test_success_of_datasets_is_that_of_their_rows():
 
 def test_latency_of_the_lab_is_that_of_its_rows():
     rows = rows_of("lab_latency.csv")
-    shown = table("docs/lab.md", "median, ms", "profile `ur5e`, ms")
+    shown = table("docs/robot_results.md", "median, ms", "profile `ur5e`, ms")
     for line, row in zip(shown, rows, strict=True):
         assert line["part"] == row["part"]
         assert line["median, ms"] == row["median_ms"]
@@ -339,7 +342,7 @@ def test_latency_of_the_lab_is_that_of_its_rows():
 
 def test_tasks_through_the_lab_are_those_of_their_rows():
     rows = {row["task"]: row for row in rows_of("lab_tasks.csv")}
-    shown = table("docs/lab.md", "through camera and arm", "plant alone")
+    shown = table("docs/robot_results.md", "through camera and arm", "plant alone")
     assert len(shown) == len(rows) == 5
     for line in shown:
         row = rows[line["task"]]
@@ -364,7 +367,7 @@ def test_first_starts_are_those_that_were_measured():
 
 def test_tracking_is_that_of_its_rows():
     rows = {(row["filter"], row["clock"]): row for row in rows_of("tracking.csv")}
-    shown = table("docs/robot.md", "latency, ms")
+    shown = table("docs/robot_results.md", "latency, ms")
     assert len(shown) == len(rows)
     for line in shown:
         row = rows[line["filter"], line["clock"]]
@@ -383,7 +386,7 @@ def test_filters_are_those_of_their_rows():
         "largest jerk, m/s3": "jerk_peak",
         "protective stops an hour": "stops_per_hour",
     }
-    shown = table("docs/robot.md", *columns)
+    shown = table("docs/robot_results.md", *columns)
     assert len(shown) >= 20
     for line in shown:
         row = rows[(*map(line.get, cell), line["filter, its time"])]
@@ -393,7 +396,7 @@ def test_filters_are_those_of_their_rows():
 
 
 def test_distances_after_a_stop_are_those_of_the_limits():
-    for line in table("docs/robot.md", "moves on by"):
+    for line in table("docs/robot.md", "stopping distance"):
         speed = float(line["speed"].removesuffix(" m/s"))
         distance = LATEST * speed + MotionLimits(speed=speed).stopping_distance
-        assert line["moves on by"] == f"{distance:.2f} m"
+        assert line["stopping distance"] == f"{distance:.2f} m"

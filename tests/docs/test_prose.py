@@ -66,12 +66,3 @@ def test_code_is_checked_by_its_parts(tmp_path, words):
     ):
         lines = found(tmp_path, place, CODE.format(entry=entry), words)
         assert (5, "fragments") in lines, entry
-
-
-def test_a_limit_of_a_folder_holds_and_falls():
-    made = [check_prose.Finding("marl_airhockey/sim/core/a.py", 1, "words", "")] * 3
-    (key, count), *others = check_prose.counts_of(made).items()
-    assert (key, count, others) == ("marl_airhockey/sim words", 3, [])
-    assert check_prose.worse({key: 3}, {key: 3}) == {}
-    assert check_prose.worse({key: 4}, {key: 3}) == {key: 4}
-    assert check_prose.worse({"docs words": 1}, {key: 3}) == {"docs words": 1}

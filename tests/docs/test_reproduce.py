@@ -42,7 +42,10 @@ def test_committed_rows_are_named_and_not_computed(name, tmp_path):
     head, *rest = shown.splitlines()
     there, wanted = head.split(": ")[1].split(" rows")[0].split(" of ")
     assert there == wanted != "0"
-    assert rest == ["nothing to compute; --again does, --rows FILE keeps it elsewhere"]
+    assert rest == [
+        "nothing to compute; --again computes the rows again, --rows FILE writes them "
+        "to another file"
+    ]
 
 
 def test_rows_are_computed_again_into_another_file(tmp_path):

@@ -1,4 +1,4 @@
-"""The commands from one's own table to one's own policy run in order, in a lab."""
+"""The commands from a table to a policy run in order, in a lab."""
 
 import os
 import re
@@ -13,7 +13,7 @@ import pytest
 
 from marl_airhockey.hardware.lab.lab import LabClient
 
-PAGE = Path(__file__).parents[3] / "docs/teleop.md"
+PAGE = Path(__file__).parents[3] / "docs/fitting.md"
 SHORTER = {
     "--episodes 26": "--episodes 5",
     "train juggle": "train juggle --steps 20000",
@@ -23,8 +23,8 @@ SHORTER = {
 
 def commands():
     """Return the first block of the section, a command a line."""
-    section = PAGE.read_text().split("## From one's own table to one's own policy")[1]
-    block = re.search(r"(?:^    .*\n)+", section, re.M)[0]
+    section = PAGE.read_text().split("## From your table to your policy")[1]
+    block = re.search(r"(?:^    .*\n)+", section, re.M)[0].replace("\\\n", " ")
     lines = [line.strip() for line in block.splitlines()]
     assert len(lines) == 6
     for long, short in SHORTER.items():
